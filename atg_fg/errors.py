@@ -1,0 +1,33 @@
+"""The errors a user can cause; each message names the place, the value and what was expected."""
+
+from __future__ import annotations
+
+
+class AtgError(Exception):
+    """Any error of this project that a user can cause and mend."""
+
+
+class InvalidInputError(AtgError, ValueError):
+    """A value, file or option that is not what was expected."""
+
+
+class UnknownNameError(AtgError, LookupError):
+    """A name that is in no registry, or a graph that is not in the memory."""
+
+
+class ImpossibleEvidenceError(AtgError, ValueError):
+    """Evidence that has probability zero under the model."""
+
+
+class TooLargeError(AtgError, ValueError):
+    """A computation refused before it takes memory, because of its size."""
+
+
+class MissingDependencyError(AtgError, ImportError):
+    """An optional package that is not installed; the message names the extra that brings it."""
+
+
+def unknown_name(kind: str, name: object, known: object) -> UnknownNameError:
+    """Return the error for ``name`` missing from a registry, listing the names ``known`` there."""
+    names = ", ".join(sorted(map(str, known)))  # type: ignore[call-overload]
+    return UnknownNameError(f"{kind}: unknown name {name!r}; expected one of: {names}")
