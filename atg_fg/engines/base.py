@@ -1,0 +1,184 @@
+"""What every inference engine offers, and the part that most of them share."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from atg_fg.belief import IdentityBelief
+from atg_fg.chain import Chain, History, build_chain
+from atg_fg.errors import ImpossibleEvidenceError, InvalidInputError
+from atg_fg.memory import RobotMemory
+from atg_fg.model import RecognitionModel, Revelation
+from atg_fg.parameters import ModelParameters
+from atg_fg.patterns import Evidence, FloatArray
+
+
+class Inference(ABC):
+    """Inference in one trial: look, act, look, act …, and ask for the posterior at any time.
+
+    A subclass is an engine. It says by ``exact`` whether its posteriors are those of the model.
+
+    Args:
+        memory: The robot memory when the trial begins; it is not changed.
+        parameters: α, δ and whether to learn within the trial.
+    """
+
+    name: ClassVar[str]
+    exact: ClassVar[bool]
+
+    def __init__(self, memory: RobotMemory, parameters: ModelParameters) -> None:
+        self.memory = memory
+        self.parameters = parameters
+        self.model = RecognitionModel(memory, parameters)
+        self.history = History()
+
+    def observe(self, evidence: Evidence) -> None:
+        """Take in the evidence z_t of a look, then learn from it if the parameters say so.
+
+        Raises:
+            InvalidInputError: It is an action's turn, or the evidence is not over this alphabet.
+            ImpossibleEvidenceError: The evidence has probability zero under the model; nothing has changed.
+        """
+        if not self.history.awaits_evidence:
+            raise InvalidInputError("trial: two observations in a row; expected an action between them")
+        if evidence.likelihood.shape != (self.model.n_patterns,):
+            raise InvalidInputError(
+                f"evidence: shape {evidence.likelihood.shape}; expected ({self.model.n_patterns},)"
+            )
+        self._update(self.model.likelihood(evidence))
+        self.history.evidence.append(evidence)
+        revelation = self.history.learn(self.model)
+        if revelation is not None:
+            self._divide(revelation)
+
+    def act(self, action: int) -> None:
+        """Predict the effect of an action a_{t+1}.
+
+        Raises:
+            InvalidInputError: It is an observation's turn, or there is no such action.
+        """
+        if self.history.awaits_evidence:
+            raise InvalidInputError("trial: an action without an observation before it; expected an observation")
+        if isinstance(action, bool) or not 0 <= action < self.model.n_actions:
+            raise InvalidInputError(f"action: {action!r}; expected 0 to {self.model.n_actions - 1}")
+        self._predict(int(action))
+        self.history.actions.append(int(action))
+
+    def expected_entropies(self) -> FloatArray:
+        """E[H(O | z_{t+1}, a, …)] of each action (eq. 3) in nats, shape [A].
+
+        Raises:
+            InvalidInputError: Asked before a look or between an action and its look.
+        """
+        if self.history.awaits_evidence:
+            raise InvalidInputError("expected entropy: asked before the look; expected an observation first")
+        return self._expected_entropies()
+
+    def chain(self, hypothesis: int | None = None) -> Chain:
+        """Return the trial so far as plain arrays, for all hypotheses or under one of them."""
+        return build_chain(self.memory, self.parameters, self.history, None if hypothesis is None else [hypothesis])
+
+    @abstractmethod
+    def identity(self) -> IdentityBelief:
+        """Return p(O | z_0:t, a_1:t) (eq. 1 and 2)."""
+
+    @property
+    @abstractmethod
+    def log_evidence(self) -> float:
+        """ln p(z_0:t | a_1:t)."""
+
+    @abstractmethod
+    def smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
+        """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s, each of shape [W_s].
+
+        State 0 is the collection node, state 1 + k the k-th known aspect.
+        """
+
+    @abstractmethod
+    def _update(self, likelihood: FloatArray) -> None:
+        """Condition on a look with p(z | x, i), shape [H, W]; raise before any change if impossible."""
+
+    @abstractmethod
+    def _divide(self, revelation: Revelation) -> None:
+        """Move belief from collection nodes to the aspects just found; the model has them already."""
+
+    @abstractmethod
+    def _predict(self, action: int) -> None:
+        """Add the action's transition."""
+
+    @abstractmethod
+    def _expected_entropies(self) -> FloatArray:
+        """Return eq. 3 for each action, shape [A]."""
+
+
+class _State(NamedTuple):
+    """A filter's state: ln p(O | z), shape [H], and p(X_t | O, z), shape [H, W]."""
+
+    log_identity: FloatArray
+    aspects: FloatArray
+
+
+class FilterInference(Inference):
+    """Engines that carry p(O, X_t | z_0:t) forward.
+
+    The belief is kept as ln p(O) and p(X_t | O). So an object that has been improbable for a thousand steps can come
+    back when the evidence turns, where a plain product would have underflowed to zero.
+    """
+
+    def __init__(self, memory: RobotMemory, parameters: ModelParameters) -> None:
+        super().__init__(memory, parameters)
+        self._belief = _State(np.log(self.model.prior), self.model.base)
+        self._log_evidence = 0.0
+
+    def identity(self) -> IdentityBelief:
+        """Return p(O | z_0:t, a_1:t) (eq. 1 and 2)."""
+        probabilities = np.exp(self._belief.log_identity)
+        return IdentityBelief(probabilities[:-1], float(probabilities[-1]), self.model.n_unseen)
+
+    @property
+    def log_evidence(self) -> float:
+        """ln p(z_0:t | a_1:t)."""
+        return self._log_evidence
+
+    @property
+    def aspect_belief(self) -> FloatArray:
+        """p(O, X_t | z_0:t, a_1:t), shape [H, W]."""
+        return np.exp(self._belief.log_identity)[:, None] * self._belief.aspects
+
+    def _update(self, likelihood: FloatArray) -> None:
+        joint = self._correct(self._belief.aspects, likelihood)
+        given_object = joint.sum(axis=1)
+        possible = given_object > 0
+        log_joint = self._belief.log_identity + np.log(given_object, out=np.full_like(given_object, -np.inf), where=possible)
+        peak = log_joint.max()
+        if not np.isfinite(peak):
+            raise ImpossibleEvidenceError(
+                f"observation {len(self.history.evidence)}: the evidence has probability zero under the model; "
+                "expected evidence that some object could give, or noise above 0"
+            )
+        log_probability = float(peak + np.log(np.exp(log_joint - peak).sum()))
+        # A hypothesis that is ruled out keeps its prediction; its weight is zero from here on.
+        divisor = np.where(possible, given_object, 1.0)[:, None]
+        aspects = np.where(possible[:, None], joint / divisor, self._belief.aspects)
+        self._belief = _State(log_joint - log_probability, aspects)
+        self._log_evidence += log_probability
+
+    def _divide(self, revelation: Revelation) -> None:
+        padding = self.model.n_states - self._belief.aspects.shape[1]
+        aspects = np.pad(self._belief.aspects, ((0, 0), (0, padding)))
+        revelation.move(aspects)
+        self._belief = _State(self._belief.log_identity, aspects)
+
+    def _predict(self, action: int) -> None:
+        self._belief = _State(self._belief.log_identity, self._propagate(self._belief.aspects, action))
+
+    @abstractmethod
+    def _propagate(self, aspects: FloatArray, action: int) -> FloatArray:
+        """Return p(X_{t+1} | O, a, z_0:t) from p(X_t | O, z_0:t), both of shape [H, W]."""
+
+    @abstractmethod
+    def _correct(self, aspects: FloatArray, likelihood: FloatArray) -> FloatArray:
+        """Return p(X_t, z_t | O, z_0:t-1), shape [H, W]."""

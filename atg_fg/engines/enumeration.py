@@ -1,0 +1,99 @@
+"""Brute force over every state of (O, X_0:t): slow, small, and too simple to be wrong."""
+
+from __future__ import annotations
+
+from typing import ClassVar
+
+import numpy as np
+
+from atg_fg.belief import IdentityBelief
+from atg_fg.engines.base import Inference
+from atg_fg.errors import ImpossibleEvidenceError, TooLargeError
+from atg_fg.memory import RobotMemory
+from atg_fg.model import Revelation
+from atg_fg.parameters import ModelParameters
+from atg_fg.patterns import Evidence, FloatArray
+
+#: Most explanations (O, X_0:t) that are enumerated: 160 MB of weights.
+MAX_EXPLANATIONS = 20_000_000
+
+
+class Enumeration(Inference):
+    """Keeps p(o, x_0, …, x_t, z_0:t | a_1:t) of every explanation, shape [H, W_0, …, W_t].
+
+    Raises:
+        TooLargeError: A step would need over ``MAX_EXPLANATIONS`` weights.
+    """
+
+    name: ClassVar[str] = "enumeration"
+    exact: ClassVar[bool] = True
+
+    def __init__(self, memory: RobotMemory, parameters: ModelParameters) -> None:
+        super().__init__(memory, parameters)
+        self.weights: FloatArray = self.model.prior[:, None] * self.model.base
+
+    def identity(self) -> IdentityBelief:
+        """Return p(O | z_0:t, a_1:t) (eq. 1 and 2)."""
+        return self._identity_of(self.weights)
+
+    @property
+    def log_evidence(self) -> float:
+        """ln p(z_0:t | a_1:t)."""
+        return float(np.log(self.weights.sum()))
+
+    def smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
+        """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s."""
+        weights = self.weights[hypothesis] / self.weights[hypothesis].sum()
+        times = range(weights.ndim)
+        return [weights.sum(axis=tuple(other for other in times if other != time)) for time in times]
+
+    def _identity_of(self, weights: FloatArray) -> IdentityBelief:
+        by_object = weights.reshape(len(weights), -1).sum(axis=1) / weights.sum()
+        return IdentityBelief(by_object[:-1], float(by_object[-1]), self.model.n_unseen)
+
+    def _update(self, likelihood: FloatArray) -> None:
+        weights = self._times_last(self.weights, likelihood)
+        if not weights.sum() > 0:
+            raise ImpossibleEvidenceError(
+                f"observation {len(self.history.evidence)}: the evidence has probability zero under the model; "
+                "expected evidence that some object could give, or noise above 0"
+            )
+        self.weights = weights
+
+    def _divide(self, revelation: Revelation) -> None:
+        padding = [(0, 0)] * (self.weights.ndim - 1) + [(0, self.model.n_states - self.weights.shape[-1])]
+        weights = np.moveaxis(np.pad(self.weights, padding), 0, -2)  # a copy with axes [W_0, …, H, W_t]
+        revelation.move(weights)
+        self.weights = np.moveaxis(weights, -2, 0)
+
+    def _predict(self, action: int) -> None:
+        self.weights = self._extended(self.weights, action)
+
+    def _extended(self, weights: FloatArray, action: int) -> FloatArray:
+        """Every explanation followed by every next aspect, shape [H, W_0, …, W_t, W_t+1]."""
+        if weights.size * self.model.n_states > MAX_EXPLANATIONS:
+            raise TooLargeError(
+                f"engine 'enumeration': {weights.size * self.model.n_states} explanations at observation "
+                f"{len(self.history.evidence)}; expected at most {MAX_EXPLANATIONS}, so use another engine"
+            )
+        transition = self.model.transition(action)
+        past = (1,) * (weights.ndim - 2)
+        return weights[..., None] * transition.reshape(len(weights), *past, *transition.shape[1:])
+
+    @staticmethod
+    def _times_last(weights: FloatArray, likelihood: FloatArray) -> FloatArray:
+        past = (1,) * (weights.ndim - 2)
+        return weights * likelihood.reshape(len(weights), *past, likelihood.shape[1])
+
+    def _expected_entropies(self) -> FloatArray:
+        """Add every hypothetical action and then every hypothetical pattern, as eq. 3 is written."""
+        entropies = np.zeros(self.model.n_actions)
+        total = self.weights.sum()
+        for action in range(self.model.n_actions):
+            predicted = self._extended(self.weights, action)
+            for pattern in np.eye(self.model.n_patterns):
+                observed = self._times_last(predicted, self.model.likelihood(Evidence(pattern)))
+                probability = observed.sum() / total
+                if probability > 0:
+                    entropies[action] += probability * self._identity_of(observed).entropy
+        return entropies

@@ -1,0 +1,55 @@
+"""Parameters of the recognition model, and the presets that name useful sets of them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Final
+
+from atg_fg.errors import InvalidInputError, unknown_name
+
+
+@dataclass(frozen=True)
+class ModelParameters:
+    """How much noise the model assumes, and whether it learns while a trial goes on.
+
+    Attributes:
+        transition_concentration: α ≥ 0, the Dirichlet concentration that the base distribution has
+            beside the counted transitions.
+        observation_noise: 0 ≤ δ < 1, the probability that a look shows a pattern drawn uniformly.
+        learn_in_trial: Extend every hypothesis, *unseen* too, as the trial goes.
+
+    Raises:
+        InvalidInputError: A value out of its range or not finite.
+    """
+
+    transition_concentration: float = 1e-8
+    observation_noise: float = 1e-8
+    learn_in_trial: bool = True
+
+    def __post_init__(self) -> None:
+        alpha, delta = self.transition_concentration, self.observation_noise
+        if not _is_number(alpha) or not math.isfinite(alpha) or alpha < 0:
+            raise InvalidInputError(f"transition_concentration: {alpha!r}; expected a finite number of at least 0")
+        if not _is_number(delta) or not 0 <= delta < 1:
+            raise InvalidInputError(f"observation_noise: {delta!r}; expected a number from 0 to below 1")
+        if not isinstance(self.learn_in_trial, bool):
+            raise InvalidInputError(f"learn_in_trial: {self.learn_in_trial!r}; expected true or false")
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+#: ``paper`` is the noise-free limit in which the printed Table 1 comes out; ``default`` also learns within the trial.
+PRESETS: Final[dict[str, ModelParameters]] = {
+    "paper": ModelParameters(1e-8, 1e-8, learn_in_trial=False),
+    "default": ModelParameters(1e-8, 1e-8, learn_in_trial=True),
+}
+
+
+def preset(name: str) -> ModelParameters:
+    """Return the parameters named ``name``, or raise ``UnknownNameError``."""
+    if name not in PRESETS:
+        raise unknown_name("preset", name, PRESETS)
+    return PRESETS[name]

@@ -1,0 +1,178 @@
+"""Recognition as a factor graph: O, X_0 … X_t, and a factor for all that is known of them.
+
+    p(O) · p(X_0 | O) · Π_s p(X_s | X_{s-1}, a_s, O) · Π_s p(z_s | X_s, O)
+
+What the paper calls the Bayes filter is a marginal of this graph, and its expected entropy (eq. 3) is that of the graph
+with one more action and one more observation added as factors.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import gtsam
+import numpy as np
+
+from atg_fg import factors
+from atg_fg.belief import IdentityBelief
+from atg_fg.chain import Chain
+from atg_fg.drawing import recognition_svg
+from atg_fg.errors import ImpossibleEvidenceError, InvalidInputError
+from atg_fg.factors import FactorGraph, aspect_key, key_name, object_key
+from atg_fg.patterns import FloatArray
+
+
+class RecognitionGraph:
+    """The factor graph of one trial.
+
+    Args:
+        chain: The trial's tables.
+        n_unseen: U, how many objects the state *unseen* stands for.
+
+    Attributes:
+        graph: The ``gtsam.DiscreteFactorGraph``.
+        last: Time t of the last aspect variable.
+    """
+
+    def __init__(self, chain: Chain, n_unseen: int) -> None:
+        self.chain = chain
+        self.n_unseen = n_unseen
+        self.graph: FactorGraph = gtsam.DiscreteFactorGraph()
+        self.last = 0
+        self._widths = [chain.initial.shape[1]]
+        self._add([object_key()], chain.prior)
+        self._add([object_key(), aspect_key(0)], chain.initial)
+        for transition in chain.transitions:
+            self.act(transition)
+        for time, likelihood in enumerate(chain.likelihoods):
+            self.observe(likelihood, time)
+
+    def act(self, transition: FloatArray) -> None:
+        """Add X_{t+1} and the action's factor p(X_{t+1} | X_t, a, O), shape [H, W_t, W_{t+1}]."""
+        self._add([object_key(), aspect_key(self.last), aspect_key(self.last + 1)], transition)
+        self._widths.append(transition.shape[2])
+        self.last += 1
+
+    def observe(self, likelihood: FloatArray, time: int | None = None) -> None:
+        """Add the evidence's factor p(z | X, O), shape [H, W], at ``time`` (now if not given)."""
+        self._add([object_key(), aspect_key(self.last if time is None else time)], likelihood)
+
+    def _add(self, keys: list[int], table: FloatArray) -> None:
+        self.graph.push_back(factors.factor(keys, table))
+
+    def copy(self) -> RecognitionGraph:
+        """Return a graph that shares these factors and can be added to alone."""
+        twin = RecognitionGraph.__new__(RecognitionGraph)
+        twin.chain, twin.n_unseen, twin.last = self.chain, self.n_unseen, self.last
+        twin._widths = list(self._widths)
+        twin.graph = gtsam.DiscreteFactorGraph()
+        twin.graph.push_back(self.graph)
+        return twin
+
+    def eliminate(self) -> Any:
+        """Return the Bayes net p(O) Π p(X_s | X_{s+1}, O) left by eliminating X_0, …, X_t and then O.
+
+        Raises:
+            ImpossibleEvidenceError: The evidence has probability zero.
+        """
+        # O last: its factor would couple all aspect variables, and grow with every step.
+        order = factors.ordering([*map(aspect_key, range(self.last + 1)), object_key()])
+        try:
+            return self.graph.sumProduct(order)
+        except RuntimeError as error:
+            raise _impossible() from error
+
+    def identity(self) -> IdentityBelief:
+        """p(O | z_0:t, a_1:t) (eq. 1 and 2): the marginal of O, which elimination leaves for last."""
+        net = self.eliminate()
+        return self._identity_of(net.at(net.size() - 1))
+
+    def _identity_of(self, conditional: Any) -> IdentityBelief:
+        n_hypotheses = len(self.chain.prior)
+        key = object_key()
+        weights = np.array([conditional(factors.values({key: state})) for state in range(n_hypotheses)])
+        probabilities = weights / weights.sum()
+        return IdentityBelief(probabilities[:-1], float(probabilities[-1]), self.n_unseen)
+
+    def novelty(self) -> float:
+        """p(O unseen | z_0:t, a_1:t) (eq. 1)."""
+        return self.identity().unseen
+
+    def log_evidence(self) -> float:
+        """ln p(z_0:t | a_1:t), from the chain rule: any explanation's ln joint less its ln posterior."""
+        net = self.eliminate()
+        explanation = net.sample(gtsam.MT19937(0))
+        log_joint = sum(np.log(self.graph.at(index)(explanation)) for index in range(self.graph.size()))
+        return float(log_joint - net.logProbability(explanation))
+
+    def aspect_marginal(self, time: int) -> FloatArray:
+        """p(O, X_time | z_0:t, a_1:t), shape [H, W_time]: filtered for the last time, smoothed before it.
+
+        Raises:
+            InvalidInputError: There is no such time in this trial.
+            ImpossibleEvidenceError: The evidence has probability zero.
+        """
+        if not 0 <= time <= self.last:
+            raise InvalidInputError(f"time: {time!r}; expected 0 to {self.last}")
+        # Inwards from both ends of the chain: no elimination couples more than O and two aspects.
+        inwards = [*range(time), *range(self.last, time, -1)]
+        try:
+            _, left = self.graph.eliminatePartialSequential(factors.ordering(map(aspect_key, inwards)))
+        except RuntimeError as error:
+            raise _impossible() from error
+        joint = factors.table(
+            left.product(), {object_key(): len(self.chain.prior), aspect_key(time): self._widths[time]}
+        )
+        if not joint.sum() > 0:
+            raise _impossible()
+        marginal: FloatArray = joint / joint.sum()
+        return marginal
+
+    def marginals(self) -> Any:
+        """Return GTSAM's own ``DiscreteMarginals`` of this graph; ask it with ``variable``."""
+        return gtsam.DiscreteMarginals(self.graph)
+
+    def variable(self, key: int) -> tuple[int, int]:
+        """Return a variable's (key, cardinality), which is what GTSAM calls a discrete key."""
+        if key == object_key():
+            return key, factors.cardinality(len(self.chain.prior))
+        return key, factors.cardinality(self._widths[aspect_key(0) - key])
+
+    def expected_entropy_by_elimination(self, transition: FloatArray, observations: FloatArray) -> float:
+        """Expected entropy (eq. 3) of one action the straightforward way: a graph for every pattern, each eliminated.
+
+        Args:
+            transition: The hypothetical action's p(X_{t+1} | X_t, a, O), shape [H, W, W].
+            observations: p(z | X_{t+1}, O) of every pattern, shape [|𝒵|, H, W].
+        """
+        acted = self.copy()
+        acted.act(transition)
+        log_evidence = self.log_evidence()
+        expected = 0.0
+        for observation in observations:
+            hypothetical = acted.copy()
+            hypothetical.observe(observation)
+            try:
+                probability = np.exp(hypothetical.log_evidence() - log_evidence)
+            except ImpossibleEvidenceError:
+                continue
+            expected += probability * hypothetical.identity().entropy
+        return float(expected)
+
+    def dot(self) -> str:
+        """Return the graph in DOT, its variables named O, X0, X1, …"""
+        return str(self.graph.dot(key_name))
+
+    def _repr_html_(self) -> str:
+        return recognition_svg(self.last, [self.names_of(index) for index in range(self.graph.size())])
+
+    def names_of(self, index: int) -> tuple[str, ...]:
+        """Return the names of the variables of the factor with this index."""
+        return tuple(key_name(key) for key in sorted(self.graph.at(index).keys(), reverse=True))
+
+    def __repr__(self) -> str:
+        return f"RecognitionGraph(O, X0 … X{self.last}; {self.graph.size()} factors)"
+
+
+def _impossible() -> ImpossibleEvidenceError:
+    return ImpossibleEvidenceError("factor graph: the evidence has probability zero under the model")
