@@ -120,9 +120,10 @@ class RecognitionModel:
         shape = (self.n_actions, self.n_hypotheses, self.n_states)
         rows = np.ravel_multi_index((self.edges.action, self.edges.hypothesis, self.edges.source), shape)
         totals = np.bincount(rows, weights=self.edges.count, minlength=int(np.prod(shape))).astype(np.float64)
-        counted = totals > 0
+        #: whether anything was counted in a transition row, shape [A, H, W]
+        self.counted = (totals > 0).reshape(shape)
         #: α / (c + α), the share of ``base`` in each transition row, shape [A, H, W]
-        self.stay = np.divide(alpha, totals + alpha, out=np.ones_like(totals), where=counted).reshape(shape)
+        self.stay = np.divide(alpha, totals + alpha, out=np.ones_like(totals), where=totals > 0).reshape(shape)
         #: the rest of each row, divided over its edges, shape [E]
         self.edge_probability = self.edges.count / (totals[rows] + alpha)
 

@@ -1,7 +1,7 @@
 """The paper's own method: a Bayes filter, in NumPy.
 
 A transition row is ``stay · base`` plus a few counted edges (see ``atg_fg.model``), so a step costs what the
-known edges cost, and expected entropy needs one logarithm a known aspect rather than one a pattern.
+known edges cost.
 """
 
 from __future__ import annotations
@@ -10,9 +10,9 @@ from typing import ClassVar
 
 import numpy as np
 
-from atg_fg.belief import x_log_x
 from atg_fg.chain import Chain
 from atg_fg.engines.base import FilterInference
+from atg_fg.expected_entropy import NextPatternJoint, Targets, expected_entropies
 from atg_fg.model import COLLECTION
 from atg_fg.patterns import FloatArray
 
@@ -40,36 +40,23 @@ class BayesFilter(FilterInference):
         return np.bincount(cells, weights=carried, minlength=int(np.prod(shape))).reshape(shape)
 
     def _expected_entropies(self) -> FloatArray:
-        """Return Σ_z p(z) H(O | z) = Σ_z p ln p − Σ_i Σ_z J ln J + p(unseen) ln U for J = p(O = i, z | a).
-
-        For one object and action J takes one value for all patterns it does not know, one for those it knows but that no
-        counted edge leads to, and another for each target of an edge: these are all the logarithms there are.
-        """
+        """Return eq. 3 for each action, shape [A]."""
         model = self.model
-        delta, n_patterns = model.parameters.observation_noise, model.n_patterns
+        observed = 1.0 - model.parameters.observation_noise
         mass = self.aspect_belief
         total = mass.sum(axis=1)
+        noise = model.parameters.observation_noise / model.n_patterns * total
         kept = np.einsum("hx,ahx->ah", mass, model.stay)
-        noise = delta / n_patterns * total
-        joint_unknown = kept * model.base[:, COLLECTION] * model.unknown_rate + noise
-        arrivals = (1.0 - delta) * self._arrivals(mass)
-        joint_unreached = kept * ((1.0 - delta) / model.n_aspects) + noise
-
-        predictive = joint_unknown @ model.unknown + joint_unreached @ model.known
-        action, hypothesis, state = np.nonzero(arrivals)
-        carried = arrivals[action, hypothesis, state]
-        cells = action * n_patterns + model.pattern_of[hypothesis, state]
-        predictive += np.bincount(cells, weights=carried, minlength=predictive.size).reshape(predictive.shape)
-
-        unreached = x_log_x(joint_unreached)
-        reached = x_log_x(joint_unreached[action, hypothesis] + carried) - unreached[action, hypothesis]
-        joint_terms = (
-            model.n_known @ unreached.T
-            + (n_patterns - model.n_known) @ x_log_x(joint_unknown).T
-            + np.bincount(action, weights=reached, minlength=model.n_actions)
+        unreached = kept * (observed / model.n_aspects) + noise
+        arrivals = self._arrivals(mass)
+        targets = Targets(*np.nonzero(arrivals))
+        joint = NextPatternJoint(
+            unknown=kept * model.base[:, COLLECTION] * model.unknown_rate + noise,
+            unreached=unreached,
+            targets=targets,
+            reached=unreached[targets.action, targets.hypothesis] + observed * arrivals[targets],
         )
-        entropies: FloatArray = x_log_x(predictive).sum(axis=1) - joint_terms + total[-1] * np.log(model.n_unseen)
-        return np.maximum(entropies, 0.0)
+        return expected_entropies(model, joint, float(total[-1]))
 
     def smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
         """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s by forward-backward."""

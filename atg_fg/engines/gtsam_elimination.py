@@ -1,28 +1,44 @@
 """The factor graph of ``atg_fg.recognition``, eliminated with GTSAM as the trial goes.
 
 Given O = i the graph falls apart into one small chain an object, so X_t is eliminated from the factors of each object
-alone; the normaliser is what that object adds to the factor on O. For expected entropy the factors of the hypothetical
-actions and observations are added: they are one factor on X_t and Z, where Z runs over actions and the patterns
-that this object tells apart: each that it knows, and all others together.
+alone, and the normaliser is what that object adds to the factor on O. For expected entropy (eq. 3) the factors of all
+hypothetical actions and observations are added at once, as one factor on X_t and Z. States of X_t with the same row,
+and states of Z with the same column, are one state each: aspects from which nothing was counted behave like the
+collection node, and an object does not tell apart the patterns that it does not know.
 """
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import ClassVar, NamedTuple
 
 import numpy as np
 
 from atg_fg import factors
-from atg_fg.belief import x_log_x
 from atg_fg.engines.base import FilterInference
+from atg_fg.expected_entropy import NextPatternJoint, Targets, expected_entropies
 from atg_fg.factors import HYPOTHETICAL_KEY, Factor
 from atg_fg.memory import RobotMemory
-from atg_fg.model import COLLECTION, Revelation
+from atg_fg.model import COLLECTION, RecognitionModel
 from atg_fg.parameters import ModelParameters
-from atg_fg.patterns import FloatArray
+from atg_fg.patterns import FloatArray, IntArray
 from atg_fg.recognition import RecognitionGraph
 
 _NOW, _NEXT = factors.aspect_key(0), factors.aspect_key(1)
+
+
+class Hypothetical(NamedTuple):
+    """The factor p(z | x, a) of one object for all hypothetical actions and observations.
+
+    The states of X_t are all aspects without counted edges together, then each of ``sources``. The states of Z are,
+    for each action, one of the unknown patterns and one of the known unreached ones, then that of each target.
+
+    Attributes:
+        factor: On X_t and Z, of 1 + S by 2 A + R states.
+        sources: The aspects with counted edges, shape [S].
+    """
+
+    factor: Factor
+    sources: IntArray
 
 
 class GtsamElimination(FilterInference):
@@ -33,7 +49,7 @@ class GtsamElimination(FilterInference):
 
     def __init__(self, memory: RobotMemory, parameters: ModelParameters) -> None:
         super().__init__(memory, parameters)
-        self._hypothetical: list[Factor] | None = None
+        self._hypothetical: tuple[Targets, list[Hypothetical]] | None = None
 
     def graph(self) -> RecognitionGraph:
         """Return the whole factor graph of the trial so far, with O, X0 … Xt."""
@@ -46,13 +62,16 @@ class GtsamElimination(FilterInference):
 
     def _propagate(self, aspects: FloatArray, action: int) -> FloatArray:
         """Multiply each object's belief by its transition factor and sum X_t out."""
-        transition = self.model.transition(action)
+        model = self.model
+        transition = model.transition(action)
+        counted = model.counted[action]
         eliminated = factors.ordering([_NOW])
         predicted = np.zeros_like(aspects)
         for hypothesis, n_states in enumerate(self._n_states()):
-            belief = factors.factor([_NOW], aspects[hypothesis, :n_states])
-            table = transition[hypothesis, :n_states, :n_states]
-            product = belief * factors.factor([_NOW, _NEXT], table)
+            sources = np.flatnonzero(counted[hypothesis])
+            belief = factors.factor([_NOW], lumped(aspects[hypothesis], sources))
+            rows = transition[hypothesis, [COLLECTION, *sources], :n_states]
+            product = belief * factors.factor([_NOW, _NEXT], rows)
             predicted[hypothesis, :n_states] = factors.vector(product.sum(eliminated), n_states)
         return predicted
 
@@ -69,47 +88,60 @@ class GtsamElimination(FilterInference):
         return [1 + int(n_known) for n_known in self.model.n_known]
 
     def _expected_entropies(self) -> FloatArray:
-        """Return eq. 3 from p(O, z | a), which is read off the product of belief and hypothetical factors."""
-        joint = self._next_pattern_joint()
-        predictive = joint.sum(axis=1)
-        unseen = joint[:, -1].sum(axis=1)
-        entropies: FloatArray = (
-            x_log_x(predictive).sum(axis=1) - x_log_x(joint).sum(axis=(1, 2)) + unseen * np.log(self.model.n_unseen)
-        )
-        return np.maximum(entropies, 0.0)
-
-    def _next_pattern_joint(self) -> FloatArray:
-        """p(O, z_{t+1} | a, z_0:t) of every action, shape [A, H, |𝒵|]."""
+        """Return eq. 3, with p(O, z | a) read off the product of belief and hypothetical factors."""
         model, mass = self.model, self.aspect_belief
         if self._hypothetical is None or model.parameters.learn_in_trial:
             # Tables that do not change within the trial are made into factors once.
-            self._hypothetical = self.hypothetical_factors()
+            self._hypothetical = hypothetical_factors(model)
+        targets, hypotheticals = self._hypothetical
         eliminated = factors.ordering([_NOW])
-        joint = np.empty((model.n_actions, model.n_hypotheses, model.n_patterns))
-        for hypothesis, (n_states, hypothetical) in enumerate(zip(self._n_states(), self._hypothetical, strict=True)):
-            belief = factors.factor([_NOW], mass[hypothesis, :n_states])
-            product = (belief * hypothetical).sum(eliminated)
-            by_class = factors.vector(product, model.n_actions * n_states).reshape(model.n_actions, n_states)
-            by_class[:, COLLECTION] /= max(model.n_patterns - n_states + 1, 1)
-            joint[:, hypothesis] = by_class[:, model.aspect_of[hypothesis]]
-        return joint
+        unknown = np.empty((model.n_actions, model.n_hypotheses))
+        unreached = np.empty_like(unknown)
+        reached: list[FloatArray] = []
+        for hypothesis, (factor, sources) in enumerate(hypotheticals):
+            belief = factors.factor([_NOW], lumped(mass[hypothesis], sources))
+            n_kinds = factor.cardinality(HYPOTHETICAL_KEY)
+            joint = factors.vector((belief * factor).sum(eliminated), n_kinds)
+            unknown[:, hypothesis], unreached[:, hypothesis] = joint[: 2 * model.n_actions].reshape(2, -1)
+            reached.append(joint[2 * model.n_actions :])
+        pattern_joint = NextPatternJoint(unknown, unreached, targets, np.concatenate(reached))
+        return expected_entropies(model, pattern_joint, float(mass[-1].sum()))
 
-    def hypothetical_factors(self) -> list[Factor]:
-        """Return for each object the factor p(z | x, a) of all hypothetical actions and observations.
 
-        It is the product of a transition and an observation factor with X_{t+1} eliminated, on X_t and Z. The states of
-        Z are (action, pattern class): class 0 for all patterns the object does not know, class 1 + k for that of aspect k.
-        """
-        model = self.model
-        delta = model.parameters.observation_noise / model.n_patterns
-        transitions = [model.transition(action) for action in range(model.n_actions)]
-        hypothetical = []
-        for hypothesis, n_states in enumerate(self._n_states()):
-            arriving = np.stack([table[hypothesis, :n_states, :n_states] for table in transitions], axis=1)
-            shown = (1.0 - model.parameters.observation_noise) * arriving + delta
-            n_unknown = model.n_patterns - (n_states - 1)
-            shown[..., COLLECTION] += delta * (n_unknown - 1)
-            table = shown.reshape(n_states, model.n_actions * n_states)
-            hypothetical.append(factors.factor([_NOW, HYPOTHETICAL_KEY], table))
-        return hypothetical
+def lumped(mass: FloatArray, sources: IntArray) -> FloatArray:
+    """Return the mass of all states but ``sources`` together, then that of each of ``sources``."""
+    others = np.ones(len(mass), dtype=bool)
+    others[sources] = False
+    # A sum of the others, not a difference of sums: what is left may be tiny and must stay exact.
+    return np.concatenate(([mass[others].sum()], mass[sources]))
 
+
+def hypothetical_factors(model: RecognitionModel) -> tuple[Targets, list[Hypothetical]]:
+    """Return the targets of counted edges, by hypothesis, and the hypothetical factor of each hypothesis."""
+    edges, n_actions = model.edges, model.n_actions
+    leads_to = np.zeros((model.n_hypotheses, n_actions, model.n_states), dtype=bool)
+    leads_to[edges.hypothesis, edges.action, edges.target] = True
+    hypothesis_of, action_of, state_of = np.nonzero(leads_to)
+    target_number = np.cumsum(leads_to).reshape(leads_to.shape) - 1
+    first_target = np.searchsorted(hypothesis_of, np.arange(model.n_hypotheses + 1))
+    by_hypothesis = np.argsort(edges.hypothesis, kind="stable")
+    first_edge = np.searchsorted(edges.hypothesis[by_hypothesis], np.arange(model.n_hypotheses + 1))
+
+    observed = 1.0 - model.parameters.observation_noise
+    noise = model.parameters.observation_noise / model.n_patterns
+    unknown = model.stay * (model.base[:, COLLECTION] * model.unknown_rate)[:, None] + noise
+    unreached = model.stay * (observed / model.n_aspects) + noise
+    hypotheticals = []
+    for hypothesis in range(model.n_hypotheses):
+        sources = np.flatnonzero(model.counted[:, hypothesis].any(axis=0))
+        rows = np.concatenate(([COLLECTION], sources))
+        own = slice(first_target[hypothesis], first_target[hypothesis + 1])
+        reached = unreached[:, hypothesis, rows][action_of[own]]
+        own_edges = by_hypothesis[first_edge[hypothesis] : first_edge[hypothesis + 1]]
+        source, target = edges.source[own_edges], edges.target[own_edges]
+        column = target_number[hypothesis, edges.action[own_edges], target] - first_target[hypothesis]
+        row = np.searchsorted(rows, source)
+        np.add.at(reached, (column, row), observed * model.edge_probability[own_edges])
+        table = np.concatenate((unknown[:, hypothesis, rows], unreached[:, hypothesis, rows], reached)).T
+        hypotheticals.append(Hypothetical(factors.factor([_NOW, HYPOTHETICAL_KEY], table), sources))
+    return Targets(action_of, hypothesis_of, state_of), hypotheticals
