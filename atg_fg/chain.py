@@ -80,7 +80,10 @@ class Chain:
 
 
 def build_chain(
-    memory: RobotMemory, parameters: ModelParameters, history: History, hypotheses: Sequence[int] | None = None
+    memory: RobotMemory,
+    parameters: ModelParameters,
+    history: History,
+    hypotheses: Sequence[int] | None = None,
 ) -> Chain:
     """Return the chain of a trial, for all hypotheses or for some of them.
 

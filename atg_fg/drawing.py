@@ -30,7 +30,8 @@ def recognition_svg(last: int, factor_variables: Sequence[tuple[str, ...]]) -> s
         label = escape(f"factor on {', '.join(variables)}")
         squares.append(f'<rect x="{x - 5}" y="{y - 5}" width="10" height="10"><title>{label}</title></rect>')
     circles = [
-        f'<circle cx="{x}" cy="{y}" r="18" fill="white" stroke="black"/><text x="{x}" y="{y + 5}" {_STYLE}>{name}</text>'
+        f'<circle cx="{x}" cy="{y}" r="18" fill="white" stroke="black"/>'
+        f'<text x="{x}" y="{y + 5}" {_STYLE}>{name}</text>'
         for name, (x, y) in places.items()
     ]
     body = "".join([*lines, *squares, *circles])

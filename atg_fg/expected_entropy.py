@@ -1,7 +1,7 @@
 """Expected entropy of identity (eq. 3) from the joint of object and next pattern.
 
-For one object and one action p(O = i, z | a) takes few values: one for all patterns that the object does not know, one for
-those it knows but to which no counted edge leads, and another for each target of an edge. So about one
+For one object and one action p(O = i, z | a) takes few values: one for all patterns that the object does not know,
+one for those it knows but to which no counted edge leads, and another for each target of an edge. So about one
 logarithm a known edge is enough where the sum over all objects and patterns has |A|·H·|𝒵| of them.
 """
 

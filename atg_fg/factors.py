@@ -1,9 +1,11 @@
 """Plain arrays to GTSAM factors: the one place that knows keys, their order and what GTSAM must not be given.
 
 GTSAM does not check cardinalities, signs or NaN, and some bad values crash the interpreter; so every array is
-checked here. A variable with one state alone makes GTSAM read memory that is not its own, so such a variable gets a
-second, impossible state, which is left out again where values are read. The highest key becomes the root of a decision tree: O is highest, then X0, X1, … downwards, and
-the hypothetical observation is lowest.
+checked here. A variable with a single state makes GTSAM read memory that is not its own, so such a variable gets
+a second, impossible state, which is left out again where values are read.
+
+The highest key becomes the root of a decision tree: O is highest, then X0, X1, … downwards, and the hypothetical
+observation is lowest.
 """
 
 from __future__ import annotations

@@ -46,7 +46,7 @@ class AspectTransitionGraph:
 
     @property
     def n_unobserved(self) -> int:
-        """m = |G| − n, the size of the collection node; 0 when the node has ceased to be."""
+        """M = |G| − n, the size of the collection node; 0 when the node has ceased to be."""
         return self.assumptions.n_aspects - self.n_known
 
     @property
@@ -140,14 +140,14 @@ class AspectTransitionGraph:
                 if (aspect, action) not in tried:
                     yield aspect, action
 
-    def to_networkx(self) -> networkx.MultiDiGraph:
+    def to_networkx(self) -> networkx.MultiDiGraph[int | str]:
         """Return the graph for networkx.
 
         Nodes are the known aspects, by index, with attribute ``pattern``, and ``COLLECTION_NODE`` with
         attribute ``size`` while aspects are unobserved. Edges carry ``action``, ``count`` and ``observed``;
         an unknown transition is drawn to the collection node with count 0.
         """
-        graph = networkx.MultiDiGraph(name=self.name)
+        graph: networkx.MultiDiGraph[int | str] = networkx.MultiDiGraph(name=self.name)
         for aspect, pattern in enumerate(self.aspects):
             graph.add_node(aspect, pattern=pattern)
         for (source, action, target), count in sorted(self._counts.items()):

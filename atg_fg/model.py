@@ -47,7 +47,12 @@ class Edges(NamedTuple):
     hypothesis: IntArray
     source: IntArray
     target: IntArray
-    count: FloatArray
+    weight: FloatArray
+
+    def followed_by(self, other: Edges) -> Edges:
+        """Return the entries of both."""
+        action, hypothesis, source, target = (np.concatenate((self[i], other[i])) for i in range(4))
+        return Edges(action, hypothesis, source, target, np.concatenate((self.weight, other.weight)))
 
 
 class RecognitionModel:
@@ -91,7 +96,8 @@ class RecognitionModel:
             for (source, action, target), count in graph.counts.items()
         ]
         columns = np.array(entries, dtype=np.int64).reshape(-1, 5).T
-        self.edges = Edges(*columns[:4], columns[4].astype(np.float64))
+        action, hypotheses, source, target, count = columns
+        self.edges = Edges(action, hypotheses, source, target, count.astype(np.float64))
         self._refresh_aspects()
         self._refresh_transitions()
 
@@ -119,17 +125,17 @@ class RecognitionModel:
         alpha = self.parameters.transition_concentration
         shape = (self.n_actions, self.n_hypotheses, self.n_states)
         rows = np.ravel_multi_index((self.edges.action, self.edges.hypothesis, self.edges.source), shape)
-        totals = np.bincount(rows, weights=self.edges.count, minlength=int(np.prod(shape))).astype(np.float64)
+        totals = np.bincount(rows, weights=self.edges.weight, minlength=int(np.prod(shape))).astype(np.float64)
         #: whether anything was counted in a transition row, shape [A, H, W]
         self.counted = (totals > 0).reshape(shape)
         #: α / (c + α), the share of ``base`` in each transition row, shape [A, H, W]
         self.stay = np.divide(alpha, totals + alpha, out=np.ones_like(totals), where=totals > 0).reshape(shape)
         #: the rest of each row, divided over its edges, shape [E]
-        self.edge_probability = self.edges.count / (totals[rows] + alpha)
+        self.edge_probability = self.edges.weight / (totals[rows] + alpha)
 
     def transition(self, action: int) -> FloatArray:
         """Return p(x' | x, a, i) with its padding, shape [H, W, W]; see ``docs/model.md``."""
-        table = self.stay[action][:, :, None] * self.base[:, None, :]
+        table: FloatArray = self.stay[action][:, :, None] * self.base[:, None, :]
         chosen = self.edges.action == action
         where = (self.edges.hypothesis[chosen], self.edges.source[chosen], self.edges.target[chosen])
         np.add.at(table, where, self.edge_probability[chosen])
@@ -139,7 +145,9 @@ class RecognitionModel:
         """Return p(evidence | x, i) = Σ_z evidence(z) p(z | x, i), shape [H, W]."""
         noise = self.parameters.observation_noise / self.n_patterns * evidence.likelihood.sum()
         shown = evidence.likelihood[self.pattern_of]
-        table = (1.0 - self.parameters.observation_noise) * np.where(self.pattern_of >= 0, shown, 0.0) + noise
+        table: FloatArray = (1.0 - self.parameters.observation_noise) * np.where(
+            self.pattern_of >= 0, shown, 0.0
+        ) + noise
         table[:, COLLECTION] = self.unknown_rate * (self.unknown @ evidence.likelihood) + noise
         return table
 
@@ -191,6 +199,5 @@ class RecognitionModel:
             targets[hypotheses],
             np.ones(len(hypotheses)),
         )
-        self.edges = Edges(*(np.concatenate(pair) for pair in zip(self.edges, new, strict=True)))
+        self.edges = self.edges.followed_by(new)
         self._refresh_transitions()
-

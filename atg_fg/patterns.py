@@ -92,7 +92,8 @@ class PatternAlphabet:
         """Return ``detection`` as a tuple, or raise ``InvalidInputError`` naming ``place``."""
         if isinstance(detection, str) or not hasattr(detection, "__len__") or len(detection) != len(self.slots):
             raise InvalidInputError(
-                f"{place}: {detection!r}; expected one entry for each of {len(self.slots)} slots ({', '.join(self.slots)})"
+                f"{place}: {detection!r}; expected one entry for each of {len(self.slots)} slots: "
+                f"{', '.join(self.slots)}"
             )
         symbols: list[int | None] = []
         for slot, symbol in zip(self.slots, detection, strict=True):

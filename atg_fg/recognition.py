@@ -99,7 +99,7 @@ class RecognitionGraph:
         return self.identity().unseen
 
     def log_evidence(self) -> float:
-        """ln p(z_0:t | a_1:t), from the chain rule: any explanation's ln joint less its ln posterior."""
+        """Ln p(z_0:t | a_1:t), from the chain rule: any explanation's ln joint less its ln posterior."""
         net = self.eliminate()
         explanation = net.sample(gtsam.MT19937(0))
         log_joint = sum(np.log(self.graph.at(index)(explanation)) for index in range(self.graph.size()))
@@ -160,7 +160,7 @@ class RecognitionGraph:
         return float(expected)
 
     def dot(self) -> str:
-        """Return the graph in DOT, its variables named O, X0, X1, …"""
+        """Return the graph in DOT, with its variables named O, X0, X1 and so on."""
         return str(self.graph.dot(key_name))
 
     def _repr_html_(self) -> str:

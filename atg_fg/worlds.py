@@ -7,7 +7,7 @@ the symbol detected there, or ``MISSING``. ``info`` carries the truth, for scori
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, ClassVar, Final, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import gymnasium
 import numpy as np
@@ -68,7 +68,7 @@ class ARcubeWorld(gymnasium.Env[IntArray, np.int64]):
     ``reset(options={"object": i, "orientation": j})`` sets what is not to be drawn at random.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": []}
+    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - gymnasium declares it so
 
     def __init__(
         self,
@@ -108,7 +108,7 @@ class ARcubeWorld(gymnasium.Env[IntArray, np.int64]):
     def step(self, action: np.int64) -> tuple[IntArray, float, bool, bool, dict[str, Any]]:
         """Turn the cube and look. There is no reward, and the episode goes on for as long as one likes."""
         if not self.action_space.contains(action):
-            raise InvalidInputError(f"action: {action!r}; expected 0 to {self.action_space.n - 1}")
+            raise InvalidInputError(f"action: {action!r}; expected 0 to {len(ACTION_SOURCES) - 1}")
         slipped = self.slip > 0 and bool(self.np_random.random() < self.slip)
         if not slipped:
             self.orientation = SUCCESSORS[self.orientation][int(action)]

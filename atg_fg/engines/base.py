@@ -45,9 +45,7 @@ class Inference(ABC):
         if not self.history.awaits_evidence:
             raise InvalidInputError("trial: two observations in a row; expected an action between them")
         if evidence.likelihood.shape != (self.model.n_patterns,):
-            raise InvalidInputError(
-                f"evidence: shape {evidence.likelihood.shape}; expected ({self.model.n_patterns},)"
-            )
+            raise InvalidInputError(f"evidence: shape {evidence.likelihood.shape}; expected ({self.model.n_patterns},)")
         self._update(self.model.likelihood(evidence))
         self.history.evidence.append(evidence)
         revelation = self.history.learn(self.model)
@@ -88,7 +86,7 @@ class Inference(ABC):
     @property
     @abstractmethod
     def log_evidence(self) -> float:
-        """ln p(z_0:t | a_1:t)."""
+        """Ln p(z_0:t | a_1:t)."""
 
     @abstractmethod
     def smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
@@ -140,7 +138,7 @@ class FilterInference(Inference):
 
     @property
     def log_evidence(self) -> float:
-        """ln p(z_0:t | a_1:t)."""
+        """Ln p(z_0:t | a_1:t)."""
         return self._log_evidence
 
     @property
@@ -152,7 +150,9 @@ class FilterInference(Inference):
         joint = self._correct(self._belief.aspects, likelihood)
         given_object = joint.sum(axis=1)
         possible = given_object > 0
-        log_joint = self._belief.log_identity + np.log(given_object, out=np.full_like(given_object, -np.inf), where=possible)
+        log_joint = self._belief.log_identity + np.log(
+            given_object, out=np.full_like(given_object, -np.inf), where=possible
+        )
         peak = log_joint.max()
         if not np.isfinite(peak):
             raise ImpossibleEvidenceError(

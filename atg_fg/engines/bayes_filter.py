@@ -26,7 +26,8 @@ class BayesFilter(FilterInference):
     def _propagate(self, aspects: FloatArray, action: int) -> FloatArray:
         model = self.model
         kept = (aspects * model.stay[action]).sum(axis=1)
-        return kept[:, None] * model.base + self._arrivals(aspects)[action]
+        predicted: FloatArray = kept[:, None] * model.base + self._arrivals(aspects)[action]
+        return predicted
 
     def _correct(self, aspects: FloatArray, likelihood: FloatArray) -> FloatArray:
         return aspects * likelihood
@@ -37,7 +38,8 @@ class BayesFilter(FilterInference):
         shape = (model.n_actions, model.n_hypotheses, model.n_states)
         cells = np.ravel_multi_index((edges.action, edges.hypothesis, edges.target), shape)
         carried = mass[edges.hypothesis, edges.source] * model.edge_probability
-        return np.bincount(cells, weights=carried, minlength=int(np.prod(shape))).reshape(shape)
+        arrivals = np.bincount(cells, weights=carried, minlength=int(np.prod(shape)))
+        return arrivals.astype(np.float64).reshape(shape)
 
     def _expected_entropies(self) -> FloatArray:
         """Return eq. 3 for each action, shape [A]."""

@@ -38,7 +38,7 @@ class Enumeration(Inference):
 
     @property
     def log_evidence(self) -> float:
-        """ln p(z_0:t | a_1:t)."""
+        """Ln p(z_0:t | a_1:t)."""
         return float(np.log(self.weights.sum()))
 
     def smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:

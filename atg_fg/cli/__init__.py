@@ -1,0 +1,48 @@
+"""The command line: ``atg-fg``. Errors a user can mend become one line on standard error and exit status 2."""
+
+from __future__ import annotations
+
+import sys
+
+import typer
+import typer.exceptions
+
+from atg_fg.cli import demo, experiments, memory, trials
+from atg_fg.errors import AtgError
+
+app = typer.Typer(
+    name="atg-fg",
+    help="Recognise objects by acting on them: Aspect Transition Graphs as discrete factor graphs.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+)
+app.command()(demo.demo)
+app.command()(experiments.table1)
+app.command()(experiments.figure3)
+app.command()(trials.trial)
+app.command()(trials.replay)
+app.add_typer(memory.app, name="memory")
+
+
+def main() -> None:
+    """Run the command line and leave with its exit status."""
+    try:
+        status = app(standalone_mode=False)
+    except (AtgError, typer.exceptions.TyperException) as error:
+        sys.exit(_fail(error))
+    except (typer.Abort, KeyboardInterrupt):
+        sys.exit(130)
+    except BrokenPipeError:
+        # The reader of a pipe has gone; nothing is wrong here.
+        sys.stderr.close()
+        sys.exit(141)
+    sys.exit(status if isinstance(status, int) else 0)
+
+
+def _fail(error: Exception) -> int:
+    """Print one line about what went wrong and return the exit status 2."""
+    format_message = getattr(error, "format_message", None)
+    message = format_message() if callable(format_message) else str(error)
+    print(f"atg-fg: {' '.join(message.split())}", file=sys.stderr)
+    return 2

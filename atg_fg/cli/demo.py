@@ -1,0 +1,97 @@
+"""``atg-fg demo``: one recognition trial on camera images, told step by step."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from atg_fg import plots, store
+from atg_fg.arcube import make_arcubes
+from atg_fg.assumptions import arcube_assumptions
+from atg_fg.cli import options
+from atg_fg.cli.story import Story
+from atg_fg.engines import begin_trial
+from atg_fg.experiments import learn_from
+from atg_fg.memory import RobotMemory
+from atg_fg.parameters import preset as preset_named
+from atg_fg.policies import EntropyPolicy, RandomPolicy
+from atg_fg.trial import TrialRecord, run_trial
+from atg_fg.worlds import World, make_world
+
+N_REMEMBERED = 6
+
+
+def demo(
+    world: options.World = "rendered",
+    engine: options.Engine = "gtsam",
+    preset: options.Preset = "default",
+    actions: Annotated[int, typer.Option(min=1, help="Number of actions.")] = 8,
+    novel: Annotated[bool, typer.Option("--novel", help="Present an object the robot has never met.")] = False,
+    output: Annotated[Path, typer.Option(help="Folder for the pictures, the memory and the record.")] = Path("out"),
+    seed: options.Seed = 0,
+) -> None:
+    """Let the robot learn a small memory, then recognise an object from camera images, step by step.
+
+    Example: atg-fg demo --seed 1 --novel
+    """
+    parameters = preset_named(preset)
+    plots.require_matplotlib()
+    folder = store.make_folder(output)
+    console = options.console()
+    learn_seed, trial_seed = np.random.SeedSequence(seed).spawn(2)
+    memory = RobotMemory(arcube_assumptions())
+    begin_trial(engine, memory, parameters)
+    # The last cube is the one the robot never meets while it learns.
+    with closing(make_world(world, cubes=make_arcubes(N_REMEMBERED + 1, seed), render_mode="rgb_array")) as made_world:
+        console.print(f"The robot turns {N_REMEMBERED} cubes over and remembers what it sees …")
+        _learn(made_world, memory, np.random.default_rng(learn_seed))
+        rng = np.random.default_rng(trial_seed)
+        presented = N_REMEMBERED if novel else int(rng.integers(N_REMEMBERED))
+        story = Story(console, memory)
+        record = run_trial(
+            made_world,
+            begin_trial(engine, memory, parameters),
+            EntropyPolicy(),
+            actions,
+            rng,
+            reset_options={"object": presented},
+            on_step=story.tell,
+        )
+        story.verdict(record)
+        truth = "a new object" if novel else memory.names[presented]
+        console.print(f"truth:   {truth}")
+        _save(folder, made_world, record, memory)
+    console.print(f"saved:   {', '.join(str(path) for path in sorted(folder.iterdir()))}")
+
+
+def _learn(world: World, memory: RobotMemory, rng: np.random.Generator) -> None:
+    """Turn each cube over at random, twelve times, knowing that it is new."""
+    for cube in range(N_REMEMBERED):
+        inference = begin_trial("bayes-filter", memory, preset_named("default"))
+        record = run_trial(world, inference, RandomPolicy(), 12, rng, reset_options={"object": cube})
+        memory.learn(record.patterns, record.actions, matched=None)
+
+
+def _save(folder: Path, world: World, record: TrialRecord, memory: RobotMemory) -> None:
+    """Save the last camera frame, the plots, the record, and the memory with what the trial taught."""
+    frame = world.render()
+    if isinstance(frame, np.ndarray):
+        plots.save_image(frame, folder / "frame.png")
+    beliefs = [step.belief for step in record.steps]
+    plots.save_figure(plots.plot_belief(beliefs, record.names), folder / "belief.png")
+    actions = record.assumptions.actions
+    expected = [
+        dict(zip(actions, step.expected_entropies.tolist(), strict=True))
+        for step in record.steps
+        if step.expected_entropies is not None
+    ]
+    chosen = [actions[action] for action in record.actions]
+    figure = plots.plot_entropy([belief.entropy for belief in beliefs], expected, chosen)
+    plots.save_figure(figure, folder / "entropy.png")
+    store.write_bytes_atomically(folder / "trial.jsonl", record.to_json_lines().encode())
+    learn_from(record, memory)
+    store.save_memory(memory, folder / "memory.json")

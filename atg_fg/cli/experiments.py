@@ -1,0 +1,210 @@
+"""``atg-fg table1`` and ``atg-fg figure3``: the paper's experiments."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.table import Table
+
+from atg_fg import store
+from atg_fg.cli import options
+from atg_fg.errors import InvalidInputError
+from atg_fg.experiments import TestPlan, TestResult, figure3_points, run_tests, summarise
+from atg_fg.parameters import preset as preset_named
+from atg_fg.policies import POLICIES
+
+#: The average row of Table 1 as printed in the paper (5 tests, 10 actions a trial).
+PAPER_TABLE1 = {"identification": 0.816, "recognition": 0.907, "success": 0.792}
+
+Tests = Annotated[int, typer.Option(min=1, help="Number of tests.")]
+Trials = Annotated[int, typer.Option(min=1, help="Trials a test.")]
+
+
+def table1(
+    world: options.World = "ideal",
+    engine: options.Engine = "gtsam",
+    preset: options.Preset = "default",
+    policy: options.Policy = "entropy",
+    tests: Tests = 5,
+    actions: Annotated[int, typer.Option(min=1, help="Actions a trial.")] = 10,
+    trials: Trials = 100,
+    seed: options.Seed = 0,
+    slip: options.Slip = 0.0,
+    wrong: options.Wrong = 0.0,
+    missing: options.Missing = 0.0,
+    jobs: options.Jobs = None,
+    json_file: options.JsonFile = None,
+) -> None:
+    """Run the paper's Table 1: tests of 100 trials, each from an empty robot memory.
+
+    Example: atg-fg table1 --preset paper --engine bayes-filter
+    """
+    options.check_json_option(json_file)
+    plan = TestPlan(
+        world=world,
+        world_options=options.world_options(slip, wrong, missing),
+        engine=engine,
+        policy=policy,
+        parameters=preset_named(preset),
+        n_actions=actions,
+        n_trials=trials,
+    )
+    with options.progress_bar("tests", tests) as advance:
+        results = []
+        for result in run_tests([(plan, seed + test) for test in range(tests)], jobs or options.available_cpus()):
+            results.append(result)
+            advance()
+    summary = summarise(results)
+    parameters = {
+        "world": world,
+        "engine": engine,
+        "preset": preset,
+        "policy": policy,
+        "tests": tests,
+        "actions": actions,
+        "trials": trials,
+        "seed": seed,
+        "slip": slip,
+        "wrong": wrong,
+        "missing": missing,
+    }
+    options.write_json({"command": "table1", "parameters": parameters, **summary}, json_file)
+    if json_file != "-":
+        title = f"Table 1: {world} world, preset {preset}, {policy} policy, {actions} actions a trial, engine {engine}"
+        options.console().print(_table1(title, results, summary))
+
+
+def _table1(title: str, results: Iterable[TestResult], summary: dict[str, Any]) -> Table:
+    """Return the paper's table, with its own average below ours."""
+    table = Table(title=title, title_justify="left")
+    for heading in ("Test", "Correct identification", "Correct recognition", "Success rate"):
+        table.add_column(heading, justify="right" if heading != "Test" else "left")
+    for number, result in enumerate(results, start=1):
+        counts = [f"{right}/{total}" for right, total in (result.identification, result.recognition)]
+        table.add_row(str(number), *counts, f"{100 * result.success[0] / result.success[1]:.0f}%")
+    table.add_section()
+    scores = ("identification", "recognition", "success")
+    table.add_row("average", *(_percent(summary["average"][score]) for score in scores), style="bold")
+    intervals = (summary["interval95"][score] for score in scores)
+    table.add_row("95% interval", *(f"{100 * low:.1f}-{100 * high:.1f}%" for low, high in intervals))
+    table.add_row("paper", *(_percent(PAPER_TABLE1[score]) for score in scores))
+    return table
+
+
+def _percent(rate: float | None) -> str:
+    return "-" if rate is None else f"{100 * rate:.1f}%"
+
+
+def figure3(
+    actions: Annotated[str, typer.Option(help="Numbers of actions, first:last or a list such as 4,6,10.")] = "4:20",
+    tests: Tests = 10,
+    world: options.World = "ideal",
+    engine: options.Engine = "bayes-filter",
+    preset: options.Preset = "default",
+    trials: Trials = 100,
+    seed: options.Seed = 0,
+    slip: options.Slip = 0.0,
+    wrong: options.Wrong = 0.0,
+    missing: options.Missing = 0.0,
+    jobs: options.Jobs = None,
+    json_file: options.JsonFile = None,
+    csv_file: Annotated[Path | None, typer.Option("--csv", help="Write the points as CSV to this file.")] = None,
+    plot: Annotated[Path | None, typer.Option(help="Draw the figure into this .png, .svg or .pdf file.")] = None,
+) -> None:
+    """Run the paper's Figure 3: success of the entropy and the random policy by number of actions.
+
+    Example: atg-fg figure3 --actions 4:20 --tests 10 --plot figure3.png --csv figure3.csv
+    """
+    numbers = parse_actions(actions)
+    options.check_json_option(json_file)
+    for path in (csv_file, plot):
+        if path is not None:
+            store.check_writable(path)
+    if plot is not None:
+        # Before the long run: without matplotlib, or with an unknown suffix, the figure would be lost.
+        from atg_fg.plots import check_figure_path
+
+        check_figure_path(plot)
+    plan = TestPlan(
+        world=world,
+        world_options=options.world_options(slip, wrong, missing),
+        engine=engine,
+        parameters=preset_named(preset),
+        n_trials=trials,
+    )
+    seeds = range(seed, seed + tests)
+    with options.progress_bar("tests", len(numbers) * len(POLICIES) * tests) as advance:
+        points = figure3_points(plan, numbers, tuple(POLICIES), seeds, jobs or options.available_cpus(), advance)
+    parameters = {
+        "world": world,
+        "engine": engine,
+        "preset": preset,
+        "actions": numbers,
+        "tests": tests,
+        "trials": trials,
+        "seed": seed,
+        "slip": slip,
+        "wrong": wrong,
+        "missing": missing,
+    }
+    options.write_json({"command": "figure3", "parameters": parameters, "points": points}, json_file)
+    if csv_file is not None:
+        store.write_bytes_atomically(csv_file, _csv(points).encode())
+    if plot is not None:
+        from atg_fg.plots import plot_success, save_figure
+
+        save_figure(plot_success(points, title=f"Figure 3: {world} world, preset {preset}"), plot)
+    if json_file != "-":
+        title = f"Figure 3: success, {world} world, preset {preset}, {tests} tests of {trials} trials"
+        options.console().print(_figure3_table(title, points))
+
+
+def parse_actions(text: str) -> list[int]:
+    """Return the numbers of actions in ``first:last`` or in a list with commas.
+
+    Raises:
+        InvalidInputError: Not in one of these forms, a number below one, or first above last.
+    """
+    parts = text.split(":") if ":" in text else text.split(",")
+    try:
+        numbers = [int(part) for part in parts]
+    except ValueError:
+        numbers = []
+    if ":" in text and len(numbers) == 2 and numbers[0] <= numbers[1]:
+        numbers = list(range(numbers[0], numbers[1] + 1))
+    elif ":" in text:
+        numbers = []
+    if not numbers or min(numbers) < 1 or len(set(numbers)) != len(numbers):
+        raise InvalidInputError(f"--actions: {text!r}; expected first:last or a list such as 4,6,10, all at least 1")
+    return numbers
+
+
+def _csv(points: list[dict[str, Any]]) -> str:
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    writer.writerow(["actions", "policy", "success", "low95", "high95", "standard_error", "tests"])
+    for point in points:
+        row = [point[key] for key in ("actions", "policy", "success")]
+        writer.writerow([*row, *point["interval95"], point["standard_error"], point["tests"]])
+    return text.getvalue()
+
+
+def _figure3_table(title: str, points: list[dict[str, Any]]) -> Table:
+    table = Table(title=title, title_justify="left")
+    table.add_column("Actions", justify="right")
+    for policy in POLICIES:
+        table.add_column(f"{policy} policy", justify="right")
+    cells = {(point["actions"], point["policy"]): point for point in points}
+    for number in dict.fromkeys(point["actions"] for point in points):
+        table.add_row(str(number), *(_with_interval(cells[number, policy]) for policy in POLICIES))
+    return table
+
+
+def _with_interval(point: dict[str, Any]) -> str:
+    low, high = point["interval95"]
+    return f"{_percent(point['success'])} ({100 * low:.1f}-{100 * high:.1f})"

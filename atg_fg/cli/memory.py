@@ -1,0 +1,88 @@
+"""``atg-fg memory``: look at a saved robot memory, check it, export its graphs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from atg_fg import store
+from atg_fg.cli import options
+from atg_fg.errors import InvalidInputError
+from atg_fg.export import to_dot, to_graphml
+
+app = typer.Typer(help="Look at a saved robot memory, check it, export its graphs.", no_args_is_help=True)
+
+MemoryFile = Annotated[Path, typer.Argument(help="A memory file (JSON).", show_default=False)]
+EXPORTS = {"graphml": to_graphml, "dot": to_dot}
+
+
+@app.command()
+def show(file: MemoryFile, json_file: options.JsonFile = None) -> None:
+    """Show the remembered objects: aspects, transitions and what is still unknown.
+
+    Example: atg-fg memory show memory.json
+    """
+    options.check_json_option(json_file)
+    memory = store.load_memory(file)
+    rows = [
+        {
+            "name": graph.name,
+            "aspects": graph.n_known,
+            "unobserved": graph.n_unobserved,
+            "edges": len(graph.counts),
+            "transitions": sum(graph.counts.values()),
+            "unknown_edges": len(list(graph.unknown_transitions())),
+        }
+        for graph in memory
+    ]
+    document = {
+        "command": "memory show",
+        "n_objects": memory.assumptions.n_objects,
+        "n_aspects": memory.assumptions.n_aspects,
+        "objects": rows,
+    }
+    options.write_json(document, json_file)
+    if json_file == "-":
+        return
+    table = Table(title=f"{file}: {len(memory)} of {memory.assumptions.n_objects} objects", title_justify="left")
+    for heading in ("object", "aspects", "unobserved", "edges", "transitions seen", "unknown edges"):
+        table.add_column(heading, justify="left" if heading == "object" else "right")
+    for row in rows:
+        table.add_row(*map(str, row.values()))
+    options.console().print(table)
+
+
+@app.command()
+def check(file: MemoryFile) -> None:
+    """Check a memory file; leave with status 2 and the first fault if it has one.
+
+    Example: atg-fg memory check memory.json
+    """
+    memory = store.load_memory(file)
+    typer.echo(f"{file}: sound, {len(memory)} ATGs")
+
+
+@app.command()
+def export(
+    file: MemoryFile,
+    name: Annotated[str | None, typer.Option(help="The ATG to export; the first one if not given.")] = None,
+    format_name: Annotated[str, typer.Option("--format", help=f"One of: {', '.join(EXPORTS)}.")] = "graphml",
+    output: Annotated[Path | None, typer.Option(help="File to write; standard output if not given.")] = None,
+) -> None:
+    """Export one ATG as GraphML or DOT.
+
+    Example: atg-fg memory export memory.json --name object-003 --format dot --output atg.dot
+    """
+    if format_name not in EXPORTS:
+        raise InvalidInputError(f"--format: {format_name!r}; expected one of: {', '.join(EXPORTS)}")
+    memory = store.load_memory(file)
+    if not len(memory):
+        raise InvalidInputError(f"{file}: the memory is empty; expected at least one ATG to export")
+    text = EXPORTS[format_name](memory[name if name is not None else memory.names[0]])
+    if output is None:
+        typer.echo(text, nl=False)
+    else:
+        store.write_bytes_atomically(output, text.encode())

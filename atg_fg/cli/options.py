@@ -1,0 +1,77 @@
+"""Options that several commands share, and how results leave the command line."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Annotated, Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+from atg_fg import store
+from atg_fg.engines import ENGINES
+from atg_fg.parameters import PRESETS
+from atg_fg.policies import POLICIES
+from atg_fg.worlds import WORLDS
+
+
+def available_cpus() -> int:
+    """Return the number of processors this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+World = Annotated[str, typer.Option(help=f"World: {', '.join(WORLDS)}, or module:namespace/Id-v0 of your own.")]
+Engine = Annotated[str, typer.Option(help=f"Inference engine: {', '.join(ENGINES)}.")]
+Preset = Annotated[str, typer.Option(help=f"Model parameters: {', '.join(PRESETS)}.")]
+Policy = Annotated[str, typer.Option(help=f"Policy: {', '.join(POLICIES)}.")]
+Seed = Annotated[int, typer.Option(min=0, help="Seed; test number k uses seed + k.")]
+Jobs = Annotated[
+    int | None, typer.Option(min=1, help="Processes; the result is the same for any number. All processors if unset.")
+]
+JsonFile = Annotated[str | None, typer.Option("--json", help="Write the result as JSON to this file, or - to print it.")]
+Slip = Annotated[float, typer.Option(min=0, max=1, help="Probability that an action fails and the cube stays.")]
+Wrong = Annotated[float, typer.Option(min=0, max=1, help="Probability that a look shows a pattern drawn at random.")]
+Missing = Annotated[float, typer.Option(min=0, max=1, help="Probability, a slot, that its symbol is not detected.")]
+
+
+def world_options(slip: float, wrong: float, missing: float) -> dict[str, float]:
+    """Return the noise options that are not zero, for the world."""
+    options = {"slip": slip, "wrong": wrong, "missing": missing}
+    return {name: value for name, value in options.items() if value}
+
+
+def check_json_option(path: str | None) -> None:
+    """Refuse a JSON path that cannot be written, before any work is done."""
+    if path not in (None, "-"):
+        store.check_writable(str(path))
+
+
+def write_json(document: dict[str, Any], path: str | None) -> None:
+    """Write a result to ``path``, or print it if that is ``-``."""
+    if path is None:
+        return
+    text = json.dumps(document, indent=1, allow_nan=False) + "\n"
+    if path == "-":
+        sys.stdout.write(text)
+    else:
+        store.write_bytes_atomically(path, text.encode())
+
+
+def console(json_path: str | None = None) -> Console:
+    """Return where tables go: standard output, or standard error if that is taken by JSON."""
+    return Console(stderr=json_path == "-", highlight=False)
+
+
+@contextmanager
+def progress_bar(description: str, total: int) -> Iterator[Any]:
+    """Show a progress bar on a terminal; give a function that advances it by one."""
+    error_console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=error_console, transient=True, disable=not error_console.is_terminal) as progress:
+        task = progress.add_task(description, total=total)
+        yield lambda: progress.advance(task)

@@ -1,0 +1,65 @@
+"""A trial told on the terminal: what was seen, what is believed, what is done next and why."""
+
+from __future__ import annotations
+
+from rich.console import Console
+from rich.text import Text
+
+from atg_fg.belief import IdentityBelief
+from atg_fg.memory import RobotMemory
+from atg_fg.trial import TrialRecord, TrialStep
+
+_BAR = 24
+
+
+class Story:
+    """Tells the steps of one trial.
+
+    Args:
+        console: Where to print.
+        memory: The robot memory the trial began with.
+    """
+
+    def __init__(self, console: Console, memory: RobotMemory) -> None:
+        self.console = console
+        self.assumptions = memory.assumptions
+        self.names = memory.names
+        self._time = 0
+
+    def tell(self, step: TrialStep) -> None:
+        """Print one look, the belief after it and the action chosen."""
+        seen = ", ".join(
+            f"{slot} {'not seen' if symbol is None else symbol}"
+            for slot, symbol in zip(self.assumptions.alphabet.slots, step.detection, strict=True)
+        )
+        self.console.print(Text(f"look {self._time}: {seen}", style="bold"))
+        for name, probability in self._top(step.belief):
+            bar = "█" * round(_BAR * probability)
+            self.console.print(f"    {name:<12} {probability:6.1%} {bar}")
+        self.console.print(f"    entropy of identity {step.belief.entropy:.3f} nats")
+        if step.action is not None:
+            chosen = self.assumptions.actions[step.action]
+            self.console.print(f"  → {chosen}{self._reasons(step)}")
+        self._time += 1
+
+    def verdict(self, record: TrialRecord) -> None:
+        """Print what the object was judged to be."""
+        belief = record.belief
+        if record.judged_novel:
+            text = f"verdict: a new object (unseen with probability {belief.unseen:.1%})"
+        else:
+            best = belief.most_probable_object
+            probability = 0.0 if best is None else float(belief.objects[best])
+            text = f"verdict: {record.matched} (probability {probability:.1%})"
+        self.console.print(Text(text, style="bold green"))
+
+    def _top(self, belief: IdentityBelief) -> list[tuple[str, float]]:
+        """Return the three most probable remembered objects, and *unseen*."""
+        order = belief.objects.argsort(kind="stable")[::-1][:3]
+        return [*((self.names[index], float(belief.objects[index])) for index in order), ("unseen", belief.unseen)]
+
+    def _reasons(self, step: TrialStep) -> str:
+        if step.expected_entropies is None:
+            return ""
+        pairs = zip(self.assumptions.actions, step.expected_entropies, strict=True)
+        return "   (expected entropy: " + ", ".join(f"{name} {value:.3f}" for name, value in pairs) + ")"

@@ -1,0 +1,118 @@
+"""``atg-fg trial`` and ``atg-fg replay``: single trials."""
+
+from __future__ import annotations
+
+import json
+import sys
+from contextlib import closing
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import typer
+from rich.table import Table
+
+from atg_fg import store
+from atg_fg.arcube import make_arcubes
+from atg_fg.assumptions import arcube_assumptions
+from atg_fg.cli import options
+from atg_fg.cli.story import Story
+from atg_fg.engines import begin_trial
+from atg_fg.experiments import learn_from
+from atg_fg.memory import RobotMemory
+from atg_fg.parameters import preset as preset_named
+from atg_fg.policies import make_policy
+from atg_fg.scripted_trial import read_script, replay as replay_script
+from atg_fg.trial import run_trial
+from atg_fg.worlds import WORLDS, make_world
+
+
+def trial(
+    world: options.World = "ideal",
+    engine: options.Engine = "gtsam",
+    preset: options.Preset = "default",
+    policy: options.Policy = "entropy",
+    actions: Annotated[int, typer.Option(min=1, help="Number of actions.")] = 10,
+    memory: Annotated[Path | None, typer.Option(help="Memory file to start from; empty if not given.")] = None,
+    save_memory: Annotated[Path | None, typer.Option(help="Save the memory with what was learned to this file.")] = None,
+    record: Annotated[Path | None, typer.Option(help="Write the trial's record as JSON lines to this file.")] = None,
+    seed: options.Seed = 0,
+    cubes_seed: Annotated[int, typer.Option(min=0, help="Seed of the world's 100 cubes.")] = 0,
+    slip: options.Slip = 0.0,
+    wrong: options.Wrong = 0.0,
+    missing: options.Missing = 0.0,
+    json_file: options.JsonFile = None,
+) -> None:
+    """Run one recognition trial, tell it step by step, and learn from it.
+
+    Example: atg-fg trial --memory memory.json --save-memory memory.json --seed 3
+    """
+    options.check_json_option(json_file)
+    for path in (save_memory, record):
+        if path is not None:
+            store.check_writable(path)
+    remembered = store.load_memory(memory) if memory else RobotMemory(arcube_assumptions())
+    inference = begin_trial(engine, remembered, preset_named(preset))
+    chosen_policy = make_policy(policy)
+    cubes = {"cubes": make_arcubes(100, cubes_seed)} if world in WORLDS else {}
+    story = Story(options.console(json_file), remembered)
+    with closing(make_world(world, **cubes, **options.world_options(slip, wrong, missing))) as made_world:
+        rng = np.random.default_rng(np.random.SeedSequence(seed))
+        result = run_trial(made_world, inference, chosen_policy, actions, rng, on_step=story.tell)
+    story.verdict(result)
+    learned = learn_from(result, remembered)
+    header = {"engine": engine, "policy": policy, "preset": preset, "world": world, "seed": seed}
+    lines = result.to_json_lines(**header)
+    if record is not None:
+        store.write_bytes_atomically(record, lines.encode())
+    if save_memory is not None:
+        store.save_memory(remembered, save_memory)
+    steps = [json.loads(line) for line in lines.splitlines()[1:-1]]
+    document = {
+        "command": "trial",
+        "parameters": header,
+        "steps": steps,
+        "judged_novel": result.judged_novel,
+        "matched": result.matched,
+        "learned": learned,
+    }
+    options.write_json(document, json_file)
+
+
+def replay(
+    files: Annotated[list[Path], typer.Argument(help="Scripted trials (JSON).", show_default=False)],
+    engine: options.Engine = "gtsam",
+    smooth: Annotated[bool, typer.Option("--smooth", help="Add p(X_t | all evidence) of every look.")] = False,
+    table: Annotated[bool, typer.Option("--table", help="Print a table for people instead of JSON.")] = False,
+) -> None:
+    """Replay scripted trials: print the posteriors at every step, a JSON document a line for each file.
+
+    Example: atg-fg replay trial.json --engine bayes-filter --smooth
+    """
+    begin_trial(engine, RobotMemory(arcube_assumptions()), preset_named("default"))
+    scripts = [read_script(store.read_text_file(file), str(file)) for file in files]
+    for file, script in zip(files, scripts, strict=True):
+        document = replay_script(script, engine, smooth=smooth)
+        if table:
+            options.console().print(_replay_table(str(file), document))
+        else:
+            sys.stdout.write(json.dumps(document, allow_nan=False) + "\n")
+
+
+def _replay_table(title: str, document: dict[str, Any]) -> Table:
+    """Return the steps with the three most probable objects, entropies and best actions."""
+    table = Table(title=f"{title} ({document['engine']})", title_justify="left")
+    for heading in ("step", "kind", "most probable objects", "unseen", "entropy", "best actions", "log evidence"):
+        table.add_column(heading)
+    for step in document["steps"]:
+        best = sorted(step["objects"].items(), key=lambda item: -item[1])[:3]
+        table.add_row(
+            str(step["step"]),
+            step["kind"],
+            ", ".join(f"{name} {probability:.3f}" for name, probability in best),
+            f"{step['unseen']:.3f}",
+            f"{step['entropy']:.3f}",
+            ", ".join(step.get("best_actions", [])),
+            f"{step['log_evidence']:.3f}",
+        )
+    return table

@@ -1,0 +1,223 @@
+"""The paper's experiments (section 5): tests of 100 trials from an empty memory, Table 1 and Figure 3."""
+
+from __future__ import annotations
+
+import multiprocessing
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import closing
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from atg_fg.arcube import make_arcubes
+from atg_fg.assumptions import arcube_assumptions
+from atg_fg.engines import ENGINES, begin_trial
+from atg_fg.errors import InvalidInputError, unknown_name
+from atg_fg.memory import RobotMemory
+from atg_fg.parameters import ModelParameters
+from atg_fg.policies import make_policy
+from atg_fg.statistics import mean, standard_error, wilson_interval
+from atg_fg.trial import TrialRecord, run_trial
+from atg_fg.worlds import WORLDS, World, make_world
+
+
+@dataclass(frozen=True)
+class TestPlan:
+    """What one test of the paper is made of.
+
+    Attributes:
+        world: Name of the world.
+        world_options: Passed on to the world, such as ``slip``.
+        engine: Name of the inference engine.
+        policy: Name of the policy.
+        parameters: α, δ and whether to learn within the trial.
+        n_actions: Actions a trial.
+        n_trials: Trials a test.
+        n_objects: |O|.
+    """
+
+    __test__ = False  # the paper calls it a test; pytest should not collect it
+
+    world: str = "ideal"
+    world_options: dict[str, Any] = field(default_factory=dict)
+    engine: str = "gtsam"
+    policy: str = "entropy"
+    parameters: ModelParameters = field(default_factory=ModelParameters)
+    n_actions: int = 10
+    n_trials: int = 100
+    n_objects: int = 100
+
+    def __post_init__(self) -> None:
+        for name in ("n_actions", "n_trials", "n_objects"):
+            if getattr(self, name) < 1:
+                raise InvalidInputError(f"{name}: {getattr(self, name)}; expected a whole number of at least 1")
+        if self.engine not in ENGINES:
+            raise unknown_name("engine", self.engine, ENGINES)
+        make_policy(self.policy)
+
+    def make_world(self, cubes_seed: int) -> World:
+        """Return this plan's world, with cubes of its own if it is one of the ARcube worlds."""
+        cubes = {"cubes": make_arcubes(self.n_objects, cubes_seed)} if self.world in WORLDS else {}
+        return make_world(self.world, **cubes, **self.world_options)
+
+
+@dataclass(frozen=True)
+class TestResult:
+    """Scores of one test, in the paper's terms.
+
+    Attributes:
+        seed: Seed of the test.
+        identification: (trials judged novel if and only if the object was, trials).
+        recognition: (of these matched to an ATG made from the object, trials in which an object met before was
+            judged known).
+        success: (trials right in both, trials).
+    """
+
+    __test__ = False
+
+    seed: int
+    identification: tuple[int, int]
+    recognition: tuple[int, int]
+    success: tuple[int, int]
+
+
+def run_test(plan: TestPlan, seed: int, on_trial: Callable[[int, TrialRecord], None] | None = None) -> TestResult:
+    """Run a test from an empty memory and score it.
+
+    Each trial has one generator, spawned from ``SeedSequence(seed)``; the first child draws the cubes.
+
+    Args:
+        plan: World, engine, policy and sizes.
+        seed: Seed of the test.
+        on_trial: Called with the number and the record of each trial.
+    """
+    cubes_seed, *trial_seeds = np.random.SeedSequence(seed).spawn(1 + plan.n_trials)
+    memory = RobotMemory(arcube_assumptions(plan.n_objects))
+    policy = make_policy(plan.policy)
+    score = _Score()
+    with closing(plan.make_world(int(cubes_seed.generate_state(1)[0]))) as world:
+        for number, trial_seed in enumerate(trial_seeds):
+            inference = begin_trial(plan.engine, memory, plan.parameters)
+            record = run_trial(world, inference, policy, plan.n_actions, np.random.default_rng(trial_seed))
+            score.add(record, learn_from(record, memory))
+            if on_trial is not None:
+                on_trial(number, record)
+    return TestResult(
+        seed,
+        (score.identified, plan.n_trials),
+        (score.recognised, score.judged_known),
+        (score.successes, plan.n_trials),
+    )
+
+
+def learn_from(record: TrialRecord, memory: RobotMemory) -> str | None:
+    """Let the memory learn from a trial; return the name of the ATG, or ``None`` if no pattern was seen whole."""
+    if all(pattern is None for pattern in record.patterns):
+        return None
+    return memory.learn(record.patterns, record.actions, record.matched)
+
+
+class _Score:
+    """Counts what is right over the trials of one test, by the truth rather than by the memory."""
+
+    def __init__(self) -> None:
+        self.identified = self.recognised = self.judged_known = self.successes = 0
+        self._presented: set[object] = set()
+        self._made_from: dict[str, object] = {}
+
+    def add(self, record: TrialRecord, learned: str | None) -> None:
+        """Score a trial whose record went to the ATG named ``learned``."""
+        truth = record.steps[0].truth["object"]
+        seen_before = truth in self._presented
+        identified = record.judged_novel != seen_before
+        right_match = record.matched is not None and self._made_from.get(record.matched) == truth
+        self.identified += identified
+        self.judged_known += seen_before and identified
+        self.recognised += seen_before and identified and right_match
+        self.successes += identified and (right_match or not seen_before)
+        self._presented.add(truth)
+        if record.judged_novel and learned is not None:
+            self._made_from[learned] = truth
+
+
+def run_tests(plans: Sequence[tuple[TestPlan, int]], jobs: int = 1) -> Iterator[TestResult]:
+    """Run each (plan, seed), in ``jobs`` processes, and yield the results in the order of ``plans``.
+
+    The results are the same for any number of jobs.
+    """
+    if jobs < 1:
+        raise InvalidInputError(f"jobs: {jobs}; expected a whole number of at least 1")
+    if jobs == 1:
+        yield from (run_test(plan, seed) for plan, seed in plans)
+        return
+    # Spawned workers share no state with this process, so they cannot inherit half of a library's.
+    context = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(min(jobs, len(plans)), mp_context=context) as executor:
+        yield from executor.map(run_test, *zip(*plans, strict=True))
+
+
+def summarise(results: Iterable[TestResult]) -> dict[str, Any]:
+    """Return the tests, their average as the paper takes it (a mean over tests), and intervals.
+
+    Wilson intervals count all trials of all tests as one sample; the standard error is over tests.
+    """
+    tests = list(results)
+    rates = {
+        name: [score[0] / score[1] for score in (getattr(test, name) for test in tests) if score[1] > 0]
+        for name in ("identification", "recognition", "success")
+    }
+    return {
+        "tests": [
+            {
+                "seed": test.seed,
+                "identification": list(test.identification),
+                "recognition": list(test.recognition),
+                "success": test.success[0] / test.success[1],
+            }
+            for test in tests
+        ],
+        "average": {name: mean(values) for name, values in rates.items()},
+        "standard_error": {name: standard_error(values) for name, values in rates.items()},
+        "interval95": {name: list(pooled_interval(tests, name)) for name in rates},
+    }
+
+
+def pooled_interval(tests: Sequence[TestResult], score: str) -> tuple[float, float]:
+    """Return the Wilson interval of a score over all trials of all tests."""
+    counts = [getattr(test, score) for test in tests]
+    return wilson_interval(sum(right for right, _ in counts), sum(number for _, number in counts))
+
+
+def figure3_points(
+    plan: TestPlan,
+    actions: Sequence[int],
+    policies: Sequence[str],
+    seeds: Sequence[int],
+    jobs: int = 1,
+    on_test: Callable[[], None] | None = None,
+) -> list[dict[str, Any]]:
+    """Return the success of each policy for each number of actions: the points of Figure 3."""
+    cells = [(n_actions, policy) for n_actions in actions for policy in policies]
+    plans = [(replace(plan, n_actions=n_actions, policy=policy), seed) for n_actions, policy in cells for seed in seeds]
+    results = []
+    for result in run_tests(plans, jobs):
+        results.append(result)
+        if on_test is not None:
+            on_test()
+    points = []
+    for number, (n_actions, policy) in enumerate(cells):
+        tests = results[number * len(seeds) : (number + 1) * len(seeds)]
+        rates = [test.success[0] / test.success[1] for test in tests]
+        points.append(
+            {
+                "actions": n_actions,
+                "policy": policy,
+                "success": mean(rates),
+                "interval95": list(pooled_interval(tests, "success")),
+                "standard_error": standard_error(rates),
+                "tests": len(tests),
+            }
+        )
+    return points
