@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from atg_fg.errors import InvalidInputError
 from atg_fg.patterns import PatternAlphabet
 
+#: Whole numbers up to here are exact as floating-point numbers.
+MAX_NUMBER = 2**53
+
 
 @dataclass(frozen=True)
 class Assumptions:
@@ -30,8 +33,8 @@ class Assumptions:
     def __post_init__(self) -> None:
         for field in ("n_objects", "n_aspects"):
             value = getattr(self, field)
-            if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-                raise InvalidInputError(f"{field}: {value!r}; expected a whole number of at least 1")
+            if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= MAX_NUMBER:
+                raise InvalidInputError(f"{field}: {value!r}; expected a whole number from 1 to 2^53")
         if not self.actions or len(set(self.actions)) != len(self.actions):
             raise InvalidInputError(f"actions: {list(self.actions)!r}; expected at least one name, all different")
         if self.n_aspects > len(self.alphabet):

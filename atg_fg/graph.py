@@ -7,15 +7,12 @@ from typing import TypeAlias
 
 import networkx
 
-from atg_fg.assumptions import Assumptions
+from atg_fg.assumptions import MAX_NUMBER, Assumptions
 from atg_fg.errors import InvalidInputError
 from atg_fg.patterns import Pattern
 
 #: Node of the networkx view that stands for all unobserved aspects.
 COLLECTION_NODE = "collection"
-
-#: Whole numbers up to here are exact as floating-point numbers.
-MAX_COUNT = 2**53
 
 #: (source aspect, action, target aspect), all by index.
 Edge: TypeAlias = tuple[int, int, int]
@@ -101,7 +98,7 @@ class AspectTransitionGraph:
             raise InvalidInputError(
                 f"{self.name}: action {action!r}; expected 0 to {len(self.assumptions.actions) - 1}"
             )
-        if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MAX_COUNT:
+        if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MAX_NUMBER:
             raise InvalidInputError(f"{self.name}: count {count!r}; expected a whole number from 1 to 2^53")
         edge = (source, action, target)
         self._counts[edge] = self._counts.get(edge, 0) + count

@@ -79,10 +79,10 @@ def read_text(value: Any, place: str) -> str:
 def check_format(document: dict[str, Any], name: str, place: str) -> None:
     """Check the keys ``format`` and ``version`` of a document."""
     if document["format"] != name:
-        raise InvalidInputError(f"{place}.format: {_brief(document['format'])}; expected {name!r}")
+        raise InvalidInputError(f"{place}: format: {_brief(document['format'])}; expected {name!r}")
     version = document["version"]
     if isinstance(version, bool) or version != 1:
-        raise InvalidInputError(f"{place}.version: {_brief(version)}; expected 1")
+        raise InvalidInputError(f"{place}: version: {_brief(version)}; expected 1")
 
 
 def read_assumptions(value: Any, place: str) -> Assumptions:

@@ -29,16 +29,21 @@ class ModelParameters:
 
     def __post_init__(self) -> None:
         alpha, delta = self.transition_concentration, self.observation_noise
-        if not _is_number(alpha) or not math.isfinite(alpha) or alpha < 0:
+        if not _is_finite_number(alpha) or alpha < 0:
             raise InvalidInputError(f"transition_concentration: {alpha!r}; expected a finite number of at least 0")
-        if not _is_number(delta) or not 0 <= delta < 1:
+        if not _is_finite_number(delta) or not 0 <= delta < 1:
             raise InvalidInputError(f"observation_noise: {delta!r}; expected a number from 0 to below 1")
         if not isinstance(self.learn_in_trial, bool):
             raise InvalidInputError(f"learn_in_trial: {self.learn_in_trial!r}; expected true or false")
 
 
-def _is_number(value: object) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool)
+def _is_finite_number(value: object) -> bool:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # a whole number too large for a float
+        return False
 
 
 #: ``paper`` is the noise-free limit in which the printed Table 1 comes out; ``default`` also learns within the trial.

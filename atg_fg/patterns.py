@@ -49,11 +49,14 @@ class PatternAlphabet:
             raise InvalidInputError(
                 f"n_symbols: {self.n_symbols}; expected at least one symbol for each of {len(self.slots)} slots"
             )
-        if len(self) > MAX_PATTERNS:
-            raise InvalidInputError(
-                f"n_symbols: {self.n_symbols} symbols in {len(self.slots)} slots make {len(self)} patterns; "
-                f"expected at most {MAX_PATTERNS}"
-            )
+        n_patterns = 1
+        for slot in range(len(self.slots)):
+            n_patterns *= self.n_symbols - slot
+            if n_patterns > MAX_PATTERNS:
+                raise InvalidInputError(
+                    f"n_symbols: {self.n_symbols} symbols in {len(self.slots)} slots make too many patterns; "
+                    f"expected at most {MAX_PATTERNS}"
+                )
 
     def __len__(self) -> int:
         """|𝒵|, the number of patterns."""

@@ -91,8 +91,10 @@ class Enumeration(Inference):
         total = self.weights.sum()
         for action in range(self.model.n_actions):
             predicted = self._extended(self.weights, action)
-            for pattern in np.eye(self.model.n_patterns):
-                observed = self._times_last(predicted, self.model.likelihood(Evidence(pattern)))
+            for pattern in range(self.model.n_patterns):
+                likelihood = np.zeros(self.model.n_patterns)
+                likelihood[pattern] = 1.0
+                observed = self._times_last(predicted, self.model.likelihood(Evidence(likelihood)))
                 probability = observed.sum() / total
                 if probability > 0:
                     entropies[action] += probability * self._identity_of(observed).entropy
