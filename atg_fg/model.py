@@ -132,6 +132,8 @@ class RecognitionModel:
         self.stay = np.divide(alpha, totals + alpha, out=np.ones_like(totals), where=totals > 0).reshape(shape)
         #: the rest of each row, divided over its edges, shape [E]
         self.edge_probability = self.edges.weight / (totals[rows] + alpha)
+        #: flat index of each edge's (action, hypothesis, target), shape [E]
+        self.edge_cells = rows + (self.edges.target - self.edges.source)
 
     def transition(self, action: int) -> FloatArray:
         """Return p(x' | x, a, i) with its padding, shape [H, W, W]; see ``docs/model.md``."""

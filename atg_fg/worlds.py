@@ -40,7 +40,7 @@ def make_world(name: str, **options: Any) -> World:
         raise unknown_name("world", name, WORLDS)
     try:
         return gymnasium.make(WORLDS.get(name, name), disable_env_checker=True, **options)
-    except (gymnasium.error.Error, ModuleNotFoundError) as error:
+    except (gymnasium.error.Error, ModuleNotFoundError, TypeError) as error:
         raise InvalidInputError(f"world {name!r}: cannot be made: {error}") from error
 
 

@@ -42,7 +42,9 @@ def main() -> None:
 
 def _fail(error: Exception) -> int:
     """Print one line about what went wrong and return the exit status 2."""
-    format_message = getattr(error, "format_message", None)
-    message = format_message() if callable(format_message) else str(error)
+    message = str(error)
+    if isinstance(error, typer.exceptions.TyperException):
+        # The parser's own messages do not all hold the value; the command line does.
+        message = f"{error.format_message()} (given: {' '.join(sys.argv[1:])}; see --help)"
     print(f"atg-fg: {' '.join(message.split())}", file=sys.stderr)
     return 2

@@ -29,7 +29,7 @@ def demo(
     world: options.World = "rendered",
     engine: options.Engine = "gtsam",
     preset: options.Preset = "default",
-    actions: Annotated[int, typer.Option(min=1, help="Number of actions.")] = 8,
+    actions: options.Actions = 8,
     novel: Annotated[bool, typer.Option("--novel", help="Present an object the robot has never met.")] = False,
     output: Annotated[Path, typer.Option(help="Folder for the pictures, the memory and the record.")] = Path("out"),
     seed: options.Seed = 0,
@@ -38,6 +38,8 @@ def demo(
 
     Example: atg-fg demo --seed 1 --novel
     """
+    options.check_at_least(1, actions=actions)
+    options.check_at_least(0, seed=seed)
     parameters = preset_named(preset)
     plots.require_matplotlib()
     folder = store.make_folder(output)

@@ -21,18 +21,15 @@ from atg_fg.policies import POLICIES
 #: The average row of Table 1 as printed in the paper (5 tests, 10 actions a trial).
 PAPER_TABLE1 = {"identification": 0.816, "recognition": 0.907, "success": 0.792}
 
-Tests = Annotated[int, typer.Option(min=1, help="Number of tests.")]
-Trials = Annotated[int, typer.Option(min=1, help="Trials a test.")]
-
 
 def table1(
     world: options.World = "ideal",
     engine: options.Engine = "gtsam",
     preset: options.Preset = "default",
     policy: options.Policy = "entropy",
-    tests: Tests = 5,
-    actions: Annotated[int, typer.Option(min=1, help="Actions a trial.")] = 10,
-    trials: Trials = 100,
+    tests: options.Tests = 5,
+    actions: options.Actions = 10,
+    trials: options.Trials = 100,
     seed: options.Seed = 0,
     slip: options.Slip = 0.0,
     wrong: options.Wrong = 0.0,
@@ -44,6 +41,8 @@ def table1(
 
     Example: atg-fg table1 --preset paper --engine bayes-filter
     """
+    options.check_at_least(1, tests=tests, actions=actions, trials=trials, jobs=jobs)
+    options.check_at_least(0, seed=seed)
     options.check_json_option(json_file)
     plan = TestPlan(
         world=world,
@@ -102,11 +101,11 @@ def _percent(rate: float | None) -> str:
 
 def figure3(
     actions: Annotated[str, typer.Option(help="Numbers of actions, first:last or a list such as 4,6,10.")] = "4:20",
-    tests: Tests = 10,
+    tests: options.Tests = 10,
     world: options.World = "ideal",
     engine: options.Engine = "bayes-filter",
     preset: options.Preset = "default",
-    trials: Trials = 100,
+    trials: options.Trials = 100,
     seed: options.Seed = 0,
     slip: options.Slip = 0.0,
     wrong: options.Wrong = 0.0,
@@ -121,6 +120,8 @@ def figure3(
     Example: atg-fg figure3 --actions 4:20 --tests 10 --plot figure3.png --csv figure3.csv
     """
     numbers = parse_actions(actions)
+    options.check_at_least(1, tests=tests, trials=trials, jobs=jobs)
+    options.check_at_least(0, seed=seed)
     options.check_json_option(json_file)
     for path in (csv_file, plot):
         if path is not None:

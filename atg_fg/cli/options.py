@@ -15,9 +15,10 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from atg_fg import store
 from atg_fg.engines import ENGINES
+from atg_fg.errors import InvalidInputError
 from atg_fg.parameters import PRESETS
 from atg_fg.policies import POLICIES
-from atg_fg.worlds import WORLDS
+from atg_fg.worlds import WORLDS, probability_option
 
 
 def available_cpus() -> int:
@@ -29,20 +30,33 @@ World = Annotated[str, typer.Option(help=f"World: {', '.join(WORLDS)}, or module
 Engine = Annotated[str, typer.Option(help=f"Inference engine: {', '.join(ENGINES)}.")]
 Preset = Annotated[str, typer.Option(help=f"Model parameters: {', '.join(PRESETS)}.")]
 Policy = Annotated[str, typer.Option(help=f"Policy: {', '.join(POLICIES)}.")]
-Seed = Annotated[int, typer.Option(min=0, help="Seed; test number k uses seed + k.")]
+Seed = Annotated[int, typer.Option(help="Seed; test number k uses seed + k.")]
+Actions = Annotated[int, typer.Option(help="Actions a trial.")]
+Tests = Annotated[int, typer.Option(help="Number of tests.")]
+Trials = Annotated[int, typer.Option(help="Trials a test.")]
 Jobs = Annotated[
-    int | None, typer.Option(min=1, help="Processes; the result is the same for any number. All processors if unset.")
+    int | None, typer.Option(help="Processes; the result is the same for any number. All processors if not given.")
 ]
-JsonFile = Annotated[str | None, typer.Option("--json", help="Write the result as JSON to this file, or - to print it.")]
-Slip = Annotated[float, typer.Option(min=0, max=1, help="Probability that an action fails and the cube stays.")]
-Wrong = Annotated[float, typer.Option(min=0, max=1, help="Probability that a look shows a pattern drawn at random.")]
-Missing = Annotated[float, typer.Option(min=0, max=1, help="Probability, a slot, that its symbol is not detected.")]
+JsonFile = Annotated[
+    str | None, typer.Option("--json", help="Write the result as JSON to this file, or - to print it.")
+]
+Slip = Annotated[float, typer.Option(help="Probability that an action fails and the cube stays.")]
+Wrong = Annotated[float, typer.Option(help="Probability that a look shows a pattern drawn at random.")]
+Missing = Annotated[float, typer.Option(help="Probability, a slot, that its symbol is not detected.")]
 
 
 def world_options(slip: float, wrong: float, missing: float) -> dict[str, float]:
     """Return the noise options that are not zero, for the world."""
     options = {"slip": slip, "wrong": wrong, "missing": missing}
-    return {name: value for name, value in options.items() if value}
+    return {name: probability_option(f"--{name}", value) for name, value in options.items() if value}
+
+
+def check_at_least(least: int, **numbers: int | None) -> None:
+    """Refuse an option, named by its keyword, whose number is below ``least``."""
+    for name, value in numbers.items():
+        if value is not None and value < least:
+            option = f"--{name.replace('_', '-')}"
+            raise InvalidInputError(f"{option}: {value}; expected a whole number of at least {least}")
 
 
 def check_json_option(path: str | None) -> None:

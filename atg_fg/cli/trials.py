@@ -32,12 +32,14 @@ def trial(
     engine: options.Engine = "gtsam",
     preset: options.Preset = "default",
     policy: options.Policy = "entropy",
-    actions: Annotated[int, typer.Option(min=1, help="Number of actions.")] = 10,
+    actions: options.Actions = 10,
     memory: Annotated[Path | None, typer.Option(help="Memory file to start from; empty if not given.")] = None,
-    save_memory: Annotated[Path | None, typer.Option(help="Save the memory with what was learned to this file.")] = None,
+    save_memory: Annotated[
+        Path | None, typer.Option(help="Save the memory with what was learned to this file.")
+    ] = None,
     record: Annotated[Path | None, typer.Option(help="Write the trial's record as JSON lines to this file.")] = None,
     seed: options.Seed = 0,
-    cubes_seed: Annotated[int, typer.Option(min=0, help="Seed of the world's 100 cubes.")] = 0,
+    cubes_seed: Annotated[int, typer.Option(help="Seed of the world's 100 cubes.")] = 0,
     slip: options.Slip = 0.0,
     wrong: options.Wrong = 0.0,
     missing: options.Missing = 0.0,
@@ -47,6 +49,8 @@ def trial(
 
     Example: atg-fg trial --memory memory.json --save-memory memory.json --seed 3
     """
+    options.check_at_least(1, actions=actions)
+    options.check_at_least(0, seed=seed, cubes_seed=cubes_seed)
     options.check_json_option(json_file)
     for path in (save_memory, record):
         if path is not None:

@@ -36,9 +36,8 @@ class BayesFilter(FilterInference):
         """Mass that counted edges carry to each state under each action, shape [A, H, W]."""
         model, edges = self.model, self.model.edges
         shape = (model.n_actions, model.n_hypotheses, model.n_states)
-        cells = np.ravel_multi_index((edges.action, edges.hypothesis, edges.target), shape)
         carried = mass[edges.hypothesis, edges.source] * model.edge_probability
-        arrivals = np.bincount(cells, weights=carried, minlength=int(np.prod(shape)))
+        arrivals = np.bincount(model.edge_cells, weights=carried, minlength=int(np.prod(shape)))
         return arrivals.astype(np.float64).reshape(shape)
 
     def _expected_entropies(self) -> FloatArray:
@@ -51,12 +50,13 @@ class BayesFilter(FilterInference):
         kept = np.einsum("hx,ahx->ah", mass, model.stay)
         unreached = kept * (observed / model.n_aspects) + noise
         arrivals = self._arrivals(mass)
-        targets = Targets(*np.nonzero(arrivals))
+        reached = np.flatnonzero(arrivals)
+        targets = Targets(*np.unravel_index(reached, arrivals.shape))
         joint = NextPatternJoint(
             unknown=kept * model.base[:, COLLECTION] * model.unknown_rate + noise,
             unreached=unreached,
             targets=targets,
-            reached=unreached[targets.action, targets.hypothesis] + observed * arrivals[targets],
+            reached=unreached[targets.action, targets.hypothesis] + observed * arrivals.ravel()[reached],
         )
         return expected_entropies(model, joint, float(total[-1]))
 

@@ -1,0 +1,59 @@
+"""The ARcube in simulation: PyBullet renders it, OpenCV ArUco detection supplies the evidence.
+
+Importing this package registers its worlds with gymnasium; PyBullet and OpenCV are imported when one is made.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import importlib
+import importlib.util
+import os
+import sys
+from typing import Any
+
+import gymnasium
+
+from atg_fg.errors import MissingDependencyError
+
+_REQUIRED = {"pybullet": "pybullet", "cv2": "opencv-python-headless"}
+
+
+def require_simulator() -> None:
+    """Raise ``MissingDependencyError`` if PyBullet or OpenCV is not installed."""
+    for module, distribution in _REQUIRED.items():
+        if importlib.util.find_spec(module) is None:
+            raise MissingDependencyError(
+                f"simulated worlds: the package {distribution} is not installed; expected the extra 'sim': "
+                'pip install "atg-fg[sim]" on Python 3.11, the last version that PyBullet has wheels for'
+            )
+
+
+def make_rendered_arcube(**options: Any) -> gymnasium.Env[Any, Any]:
+    """Return a ``sim.rendered.RenderedARcubeWorld``; its module is imported only now."""
+    require_simulator()
+    _import_quietly("pybullet")
+    from sim.rendered import RenderedARcubeWorld
+
+    return RenderedARcubeWorld(**options)
+
+
+def _import_quietly(module: str) -> None:
+    """Import a module that prints a banner from C, and send the banner to standard error.
+
+    Standard output is for results: ``--json -`` must print JSON and nothing else.
+    """
+    if module in sys.modules:
+        return
+    sys.stdout.flush()
+    standard_output = os.dup(1)
+    try:
+        os.dup2(2, 1)
+        importlib.import_module(module)
+        ctypes.CDLL(None).fflush(None)  # C keeps the banner in a buffer of its own
+    finally:
+        os.dup2(standard_output, 1)
+        os.close(standard_output)
+
+
+gymnasium.register(id="sim/RenderedARcube-v0", entry_point="sim:make_rendered_arcube")

@@ -1,0 +1,143 @@
+"""The ARcube before a camera: turned kinematically, seen as an image, read by ArUco detection."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+import cv2
+import numpy as np
+import pybullet
+from numpy.typing import NDArray
+
+from atg_fg.arcube import Cube
+from atg_fg.errors import InvalidInputError, unknown_name
+from atg_fg.patterns import FloatArray
+from atg_fg.worlds import ARcubeWorld
+from sim.camera import Camera, Light
+from sim.cube_body import CUBE_SIZE, CubeBody, rotation_of
+from sim.detection import Marker, detect_markers, detected_symbols
+
+#: Where the cube's centre stands when nothing is jittered, m.
+CUBE_CENTRE: Final = np.array([0.42, 0.0, 0.30])
+
+_WOOD, _FLOOR = [0.66, 0.50, 0.34, 1.0], [0.80, 0.82, 0.84, 1.0]
+
+
+class RenderedARcubeWorld(ARcubeWorld):
+    """An ARcube on a table; a head camera looks at it from above and in front.
+
+    Which tag is in front and which on top is decided from the tags' poses in the image, never from the truth.
+
+    Args:
+        cubes: As for ``ARcubeWorld``, like ``slip``, ``wrong`` and ``missing``.
+        image_size: (width, height) of the frame, pixels.
+        position_jitter: How far at most each action leaves the cube off its place in x and y, m.
+        yaw_jitter: How far at most it leaves the cube turned about the vertical, degrees.
+        light_jitter: How much the light may change at each look, 0 (not at all) to 1.
+        image_noise: Standard deviation of noise on each grey level (0 to 255).
+        blur: Standard deviation of a Gaussian blur, pixels.
+        render_mode: ``"rgb_array"``, or ``None``.
+
+    Attributes:
+        frame: The last camera frame, RGB, shape [height, width, 3].
+        markers: What was detected in it.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 1}  # noqa: RUF012
+
+    def __init__(
+        self,
+        cubes: Sequence[Cube] | None = None,
+        *,
+        slip: float = 0.0,
+        wrong: float = 0.0,
+        missing: float = 0.0,
+        image_size: tuple[int, int] = (320, 240),
+        position_jitter: float = 0.0,
+        yaw_jitter: float = 0.0,
+        light_jitter: float = 0.0,
+        image_noise: float = 0.0,
+        blur: float = 0.0,
+        render_mode: str | None = None,
+    ) -> None:
+        super().__init__(cubes, slip=slip, wrong=wrong, missing=missing, render_mode=render_mode)
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise unknown_name("render mode", render_mode, self.metadata["render_modes"])
+        self.position_jitter = _at_least_zero("position_jitter", position_jitter)
+        self.yaw_jitter = _at_least_zero("yaw_jitter", yaw_jitter)
+        self.light_jitter = _at_least_zero("light_jitter", light_jitter)
+        self.image_noise = _at_least_zero("image_noise", image_noise)
+        self.blur = _at_least_zero("blur", blur)
+        self.camera = Camera(image_size=image_size)
+        self.frame: NDArray[np.uint8] = np.zeros((image_size[1], image_size[0], 3), dtype=np.uint8)
+        self.markers: list[Marker] = []
+        self._client = pybullet.connect(pybullet.DIRECT)
+        self._build_table()
+        self._cube = CubeBody(self._client)
+        self._offset = np.zeros(3)
+        self._yaw = 0.0
+
+    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+        """Return the last camera frame, RGB, shape [height, width, 3]; ``None`` without a render mode."""
+        return self.frame.copy() if self.render_mode == "rgb_array" else None
+
+    def close(self) -> None:
+        """Leave PyBullet; the world cannot be used any more."""
+        if self._client >= 0:
+            pybullet.disconnect(physicsClientId=self._client)
+            self._client = -1
+
+    def _build_table(self) -> None:
+        half_sizes = ([0.32, 0.40, 0.02], _WOOD), ([4.0, 4.0, 0.01], _FLOOR)
+        table_top = CUBE_CENTRE[2] - CUBE_SIZE / 2
+        for (half_size, colour), height in zip(half_sizes, (table_top - 0.02, -0.5), strict=True):
+            shape = pybullet.createVisualShape(
+                pybullet.GEOM_BOX, halfExtents=half_size, rgbaColor=colour, physicsClientId=self._client
+            )
+            pybullet.createMultiBody(0, -1, shape, [0.5, 0.0, height], physicsClientId=self._client)
+
+    def _place(self) -> None:
+        """Put the cube down in its orientation, a little off as the jitter options say."""
+        self._offset = np.append(self.np_random.uniform(-1, 1, 2) * self.position_jitter, 0.0)
+        self._yaw = float(np.radians(self.np_random.uniform(-1, 1) * self.yaw_jitter))
+        self._cube.show(self.cubes[self.object])
+        self._cube.place(CUBE_CENTRE + self._offset, self.cube_rotation)
+
+    @property
+    def cube_rotation(self) -> FloatArray:
+        """The cube's true rotation matrix; for scoring only."""
+        cosine, sine = np.cos(self._yaw), np.sin(self._yaw)
+        turn = np.array([[cosine, -sine, 0.0], [sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+        return np.asarray(turn @ rotation_of(self.orientation))
+
+    def _detect(self) -> tuple[int, int]:
+        """Take a frame and return the symbols detected in it."""
+        frame = self.camera.render(self._client, self._light())
+        if self.blur:
+            frame = np.asarray(cv2.GaussianBlur(frame, (0, 0), self.blur), dtype=np.uint8)
+        if self.image_noise:
+            noisy = frame + self.np_random.normal(0.0, self.image_noise, (*frame.shape[:2], 1))
+            frame = np.clip(np.round(noisy), 0, 255).astype(np.uint8)
+        self.frame = frame
+        self.markers = detect_markers(frame, self.camera)
+        return detected_symbols(self.markers)
+
+    def _light(self) -> Light:
+        if not self.light_jitter:
+            return Light()
+        change = self.light_jitter * self.np_random.uniform(-1, 1, 4)
+        x, y, z = Light().direction
+        return Light((x + change[0], y + change[1], z), Light().ambient, Light().diffuse * (1 + 0.5 * change[2]))
+
+    def _truth(self, *, slipped: bool) -> dict[str, Any]:
+        truth = super()._truth(slipped=slipped)
+        truth["position"] = tuple((CUBE_CENTRE + self._offset).tolist())
+        truth["yaw"] = self._yaw
+        return truth
+
+
+def _at_least_zero(name: str, value: float) -> float:
+    if not 0 <= value < np.inf:
+        raise InvalidInputError(f"{name}: {value!r}; expected a finite number of at least 0")
+    return float(value)
