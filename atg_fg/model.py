@@ -51,8 +51,13 @@ class Edges(NamedTuple):
 
     def followed_by(self, other: Edges) -> Edges:
         """Return the entries of both."""
-        action, hypothesis, source, target = (np.concatenate((self[i], other[i])) for i in range(4))
-        return Edges(action, hypothesis, source, target, np.concatenate((self.weight, other.weight)))
+        return Edges(
+            np.concatenate((self.action, other.action)),
+            np.concatenate((self.hypothesis, other.hypothesis)),
+            np.concatenate((self.source, other.source)),
+            np.concatenate((self.target, other.target)),
+            np.concatenate((self.weight, other.weight)),
+        )
 
 
 class RecognitionModel:

@@ -39,21 +39,22 @@ def make_rendered_arcube(**options: Any) -> gymnasium.Env[Any, Any]:
 
 
 def _import_quietly(module: str) -> None:
-    """Import a module that prints a banner from C, and send the banner to standard error.
+    """Import a module that prints a banner from C, without the banner.
 
     Standard output is for results: ``--json -`` must print JSON and nothing else.
     """
     if module in sys.modules:
         return
     sys.stdout.flush()
-    standard_output = os.dup(1)
+    standard_output, nowhere = os.dup(1), os.open(os.devnull, os.O_WRONLY)
     try:
-        os.dup2(2, 1)
+        os.dup2(nowhere, 1)
         importlib.import_module(module)
         ctypes.CDLL(None).fflush(None)  # C keeps the banner in a buffer of its own
     finally:
         os.dup2(standard_output, 1)
         os.close(standard_output)
+        os.close(nowhere)
 
 
 gymnasium.register(id="sim/RenderedARcube-v0", entry_point="sim:make_rendered_arcube")

@@ -1,6 +1,7 @@
 """The 28 cm ARcube as a body in PyBullet: six square faces, each with an ArUco tag as its texture.
 
-Frame: x points away from the robot, y to its left, z up. The robot looks along +x, so the cube's front has the normal −x.
+Frame: x points away from the robot, y to its left, z up. The robot looks along +x, so the cube's
+front has the normal −x.
 """
 
 from __future__ import annotations

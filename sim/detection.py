@@ -66,7 +66,7 @@ def detect_markers(frame: NDArray[np.uint8], camera: Camera) -> list[Marker]:
     all_corners, symbols, _ = _detector().detectMarkers(grey)
     if symbols is None:
         return []
-    found = zip(all_corners, np.ravel(symbols).tolist(), strict=True)
+    found = zip(all_corners, map(int, np.ravel(symbols)), strict=True)
     return [_located(corners.reshape(4, 2), symbol, camera) for corners, symbol in found if symbol < N_TAGS]
 
 
@@ -107,9 +107,8 @@ def draw_detections(frame: NDArray[np.uint8], markers: Sequence[Marker]) -> NDAr
         text = f"{marker.symbol}" if slot is None else f"{slot} {marker.symbol}"
         (width, height), _ = cv2.getTextSize(text, cv2.FONT_HERSHEY_SIMPLEX, 0.5, 1)
         x, y = np.round(marker.corners.mean(axis=0)).astype(int).tolist()
-        corner = (x - width // 2, y + height // 2)
-        cv2.rectangle(
-            drawn, (corner[0] - 3, corner[1] + 4), (corner[0] + width + 3, corner[1] - height - 4), _COLOURS[slot], -1
-        )
-        cv2.putText(drawn, text, corner, cv2.FONT_HERSHEY_SIMPLEX, 0.5, (255, 255, 255), 1, cv2.LINE_AA)
+        left, bottom = x - width // 2, y + height // 2
+        box = (left - 3, bottom + 4), (left + width + 3, bottom - height - 4)
+        cv2.rectangle(drawn, *box, _COLOURS[slot], -1)
+        cv2.putText(drawn, text, (left, bottom), cv2.FONT_HERSHEY_SIMPLEX, 0.5, (255, 255, 255), 1, cv2.LINE_AA)
     return drawn

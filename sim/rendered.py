@@ -78,7 +78,7 @@ class RenderedARcubeWorld(ARcubeWorld):
         self._offset = np.zeros(3)
         self._yaw = 0.0
 
-    def render(self) -> NDArray[np.uint8] | None:  # type: ignore[override]
+    def render(self) -> NDArray[np.uint8] | None:
         """Return the last camera frame, RGB, shape [height, width, 3]; ``None`` without a render mode."""
         return self.frame.copy() if self.render_mode == "rgb_array" else None
 

@@ -109,7 +109,7 @@ def test_smoothed_aspects_are_probabilities_of_the_likeliest_object():
 def test_evidence_of_probability_zero_is_refused_by_step(engine):
     # Without noise, and learning within the trial, what was counted once is certain: flip leads from 01 to 23.
     def contradicts_itself(document):
-        document["parameters"] = dict(observation_noise=0, transition_concentration=0, learn_in_trial=True)
+        document["parameters"] = {"observation_noise": 0, "transition_concentration": 0, "learn_in_trial": True}
         looks = [{"observe": pattern} for pattern in ([0, 1], [2, 3], [0, 1], [4, 5])]
         document["steps"] = [step for look in looks for step in (look, {"act": "flip"})]
 

@@ -91,7 +91,10 @@ def test_a_folder_is_no_file(tmp_path):
         (lambda d: d["memory"][0]["aspects"].append(d["memory"][0]["aspects"][0]), "is repeated; expected unique"),
         (lambda d: d["memory"][0]["transitions"][0].update({"to": 99}), r"transitions\[0\].*target aspect 99"),
         (lambda d: d["memory"][0]["transitions"][0].update({"from": -1}), "from: -1"),
-        (lambda d: d["memory"][0]["transitions"][0].update(action="jump"), "'jump'; expected one of: flip, left, right"),
+        (
+            lambda d: d["memory"][0]["transitions"][0].update(action="jump"),
+            "'jump'; expected one of: flip, left, right",
+        ),
         (lambda d: d["memory"][0]["transitions"][0].update(action=["flip"]), "expected one of: flip, left, right"),
         (lambda d: d["memory"][0]["transitions"][0].update(count=0), "count: 0; expected a whole number"),
         (lambda d: d["memory"][0]["transitions"][0].update(count=1.5), "count: 1.5; expected a whole number"),

@@ -9,7 +9,7 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from atg_fg import plots, store
+from atg_fg import figures, plots, store
 from atg_fg.arcube import make_arcubes
 from atg_fg.assumptions import arcube_assumptions
 from atg_fg.cli import options
@@ -41,7 +41,7 @@ def demo(
     options.check_at_least(1, actions=actions)
     options.check_at_least(0, seed=seed)
     parameters = preset_named(preset)
-    plots.require_matplotlib()
+    figures.figure_class()  # fails now rather than at the end, if matplotlib is not installed
     folder = store.make_folder(output)
     console = options.console()
     learn_seed, trial_seed = np.random.SeedSequence(seed).spawn(2)
@@ -82,9 +82,9 @@ def _save(folder: Path, world: World, record: TrialRecord, memory: RobotMemory) 
     """Save the last camera frame, the plots, the record, and the memory with what the trial taught."""
     frame = world.render()
     if isinstance(frame, np.ndarray):
-        plots.save_image(frame, folder / "frame.png")
+        figures.save_image(frame, folder / "frame.png")
     beliefs = [step.belief for step in record.steps]
-    plots.save_figure(plots.plot_belief(beliefs, record.names), folder / "belief.png")
+    figures.save_figure(plots.plot_belief(beliefs, record.names), folder / "belief.png")
     actions = record.assumptions.actions
     expected = [
         dict(zip(actions, step.expected_entropies.tolist(), strict=True))
@@ -93,7 +93,7 @@ def _save(folder: Path, world: World, record: TrialRecord, memory: RobotMemory) 
     ]
     chosen = [actions[action] for action in record.actions]
     figure = plots.plot_entropy([belief.entropy for belief in beliefs], expected, chosen)
-    plots.save_figure(figure, folder / "entropy.png")
+    figures.save_figure(figure, folder / "entropy.png")
     store.write_bytes_atomically(folder / "trial.jsonl", record.to_json_lines().encode())
     learn_from(record, memory)
     store.save_memory(memory, folder / "memory.json")

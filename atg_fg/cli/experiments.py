@@ -11,11 +11,12 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from atg_fg import store
+from atg_fg import figures, store
 from atg_fg.cli import options
 from atg_fg.errors import InvalidInputError
 from atg_fg.experiments import TestPlan, TestResult, figure3_points, run_tests, summarise
 from atg_fg.parameters import preset as preset_named
+from atg_fg.plots import plot_success
 from atg_fg.policies import POLICIES
 
 #: The average row of Table 1 as printed in the paper (5 tests, 10 actions a trial).
@@ -123,14 +124,11 @@ def figure3(
     options.check_at_least(1, tests=tests, trials=trials, jobs=jobs)
     options.check_at_least(0, seed=seed)
     options.check_json_option(json_file)
-    for path in (csv_file, plot):
-        if path is not None:
-            store.check_writable(path)
+    # Before the long run, so that its result is not lost.
+    if csv_file is not None:
+        store.check_writable(csv_file)
     if plot is not None:
-        # Before the long run: without matplotlib, or with an unknown suffix, the figure would be lost.
-        from atg_fg.plots import check_figure_path
-
-        check_figure_path(plot)
+        figures.check_figure_path(plot)
     plan = TestPlan(
         world=world,
         world_options=options.world_options(slip, wrong, missing),
@@ -157,9 +155,7 @@ def figure3(
     if csv_file is not None:
         store.write_bytes_atomically(csv_file, _csv(points).encode())
     if plot is not None:
-        from atg_fg.plots import plot_success, save_figure
-
-        save_figure(plot_success(points, title=f"Figure 3: {world} world, preset {preset}"), plot)
+        figures.save_figure(plot_success(points, title=f"Figure 3: {world} world, preset {preset}"), plot)
     if json_file != "-":
         title = f"Figure 3: success, {world} world, preset {preset}, {tests} tests of {trials} trials"
         options.console().print(_figure3_table(title, points))

@@ -22,7 +22,8 @@ from atg_fg.experiments import learn_from
 from atg_fg.memory import RobotMemory
 from atg_fg.parameters import preset as preset_named
 from atg_fg.policies import make_policy
-from atg_fg.scripted_trial import read_script, replay as replay_script
+from atg_fg.scripted_trial import read_script
+from atg_fg.scripted_trial import replay as replay_script
 from atg_fg.trial import run_trial
 from atg_fg.worlds import WORLDS, make_world
 

@@ -1,0 +1,97 @@
+"""An ATG for other tools: GraphML (yEd, Gephi, Cytoscape, networkx) and DOT (Graphviz)."""
+
+from __future__ import annotations
+
+import re
+from typing import TYPE_CHECKING, Any, Final
+
+import networkx
+
+from atg_fg.graph import COLLECTION_NODE, AspectTransitionGraph
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+#: Characters that no XML 1.0 file can hold, not even escaped; Graphviz stops at the first of them, NUL.
+_NOT_XML: Final = re.compile("[^\t\n\r\u0020-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+
+
+def pattern_text(slots: Sequence[str], pattern: Sequence[int]) -> str:
+    """Return a pattern in words, such as "front 3, top 5", from slots and symbols of the same length."""
+    return ", ".join(f"{slot} {symbol}" for slot, symbol in zip(slots, pattern, strict=True))
+
+
+def to_graphml(graph: AspectTransitionGraph) -> str:
+    """Return the ATG as GraphML text.
+
+    Nodes are "0", "1", … with ``pattern`` ("front 3, top 5"), and "collection" with ``size`` while aspects
+    are unobserved. Edges carry ``action``, ``count`` and ``observed``, as in ``graph.to_networkx()``.
+    Characters of a name that XML cannot hold become U+FFFD. Read it back with
+    ``networkx.parse_graphml(text, force_multigraph=True)``.
+    """
+    plain: networkx.MultiDiGraph[str] = networkx.MultiDiGraph(name=_printable(graph.name))
+    view = graph.to_networkx()
+    slots = [_printable(slot) for slot in graph.assumptions.alphabet.slots]
+    for node, data in view.nodes(data=True):
+        plain.add_node(str(node), **_simple(data, slots))
+    # networkx writes the key as the edge's id, and action names repeat: number the edges instead.
+    for number, (source, target, data) in enumerate(view.edges(data=True)):
+        plain.add_edge(str(source), str(target), key=f"e{number}", **_simple(data, slots))
+    return "\n".join(networkx.generate_graphml(plain)) + "\n"
+
+
+def to_dot(graph: AspectTransitionGraph) -> str:
+    """Return the ATG as DOT text for Graphviz.
+
+    Observed edges are solid and labelled with action and count, unknown ones dotted; the collection node
+    is a double-bordered box with its size.
+    """
+    lines = [
+        f"digraph {_quoted(graph.name)} {{",
+        f"  label={_quoted(graph.name)}; labelloc=t;",
+        '  node [shape=box, style=rounded, fontname="sans-serif"];',
+        '  edge [fontname="sans-serif", fontsize=11];',
+    ]
+    view = graph.to_networkx()
+    slots = graph.assumptions.alphabet.slots
+    lines += [f"  {node} [{_node_attributes(node, data, slots)}];" for node, data in view.nodes(data=True)]
+    lines += [f"  {source} -> {target} [{_edge_attributes(data)}];" for source, target, data in view.edges(data=True)]
+    return "\n".join([*lines, "}"]) + "\n"
+
+
+def _simple(data: dict[str, Any], slots: Sequence[str]) -> dict[str, Any]:
+    """Return node or edge attributes with every value a text, a number or a truth value."""
+    simple: dict[str, Any] = {}
+    for key, value in data.items():
+        if key == "pattern":
+            simple[key] = pattern_text(slots, value)
+        else:
+            simple[key] = _printable(value) if isinstance(value, str) else value
+    return simple
+
+
+def _node_attributes(node: object, data: dict[str, Any], slots: Sequence[str]) -> str:
+    if node == COLLECTION_NODE:
+        size = data["size"]
+        label = f"collection node\n{size} unobserved aspect{'s' if size > 1 else ''}"
+        return f"label={_quoted(label)}, style=solid, peripheries=2"
+    text = pattern_text(slots, data["pattern"])
+    label = f"{node}\n{text}"
+    return f"label={_quoted(label)}"
+
+
+def _edge_attributes(data: dict[str, Any]) -> str:
+    if data["observed"]:
+        label = f"{data['action']} ×{data['count']}"
+        return f"label={_quoted(label)}, style=solid"
+    return f"label={_quoted(data['action'])}, style=dotted, color=gray50, fontcolor=gray40"
+
+
+def _printable(text: str) -> str:
+    return _NOT_XML.sub("\ufffd", text)
+
+
+def _quoted(text: str) -> str:
+    r"""Return a DOT string that Graphviz draws as ``text``: it reads \N and &lt; in labels, quoted or not."""
+    escaped = _printable(text).replace("&", "&amp;").replace("\\", "\\\\").replace('"', '\\"')
+    return '"' + escaped.replace("\r", "").replace("\n", "\\n") + '"'
