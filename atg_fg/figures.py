@@ -96,7 +96,7 @@ def save_image(image: NDArray[np.uint8], path: Path | str) -> None:
     from matplotlib import image as matplotlib_image
 
     buffer = io.BytesIO()
-    matplotlib_image.imsave(buffer, image, format="png", cmap="gray", vmin=0, vmax=255, metadata={"Software": None})
+    matplotlib_image.imsave(buffer, image, format="png", cmap="gray", vmin=0, vmax=255, metadata=_UNDATED["png"])
     store.write_bytes_atomically(path, buffer.getvalue())
 
 

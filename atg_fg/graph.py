@@ -117,6 +117,12 @@ class AspectTransitionGraph:
             raise InvalidInputError(
                 f"{self.name}: {len(patterns)} observations, {len(actions)} actions; expected one observation more"
             )
+        n_patterns = len(self.assumptions.alphabet)
+        for pattern in patterns:
+            if pattern is not None and not 0 <= pattern < n_patterns:
+                raise InvalidInputError(
+                    f"{self.name}: pattern {pattern!r}; expected an index from 0 to {n_patterns - 1}"
+                )
         aspects = [self._aspect_for(pattern) for pattern in patterns]
         for source, action, target in zip(aspects, actions, aspects[1:], strict=False):
             if source is not None and target is not None:

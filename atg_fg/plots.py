@@ -63,8 +63,8 @@ def plot_belief(beliefs: Sequence[IdentityBelief], names: Sequence[str], *, top:
         _step_axis(axes, len(beliefs))
         _label_ends(axes, ends)
         axes.annotate(
-            "novel if unseen is above", (0, 0.5), (3, 3), textcoords="offset points",
-            xycoords=axes.get_yaxis_transform(), fontsize=8, color=GREY,
+            "novel if unseen is above", (1, 0.5), (-3, 3), textcoords="offset points",
+            xycoords=axes.get_yaxis_transform(), ha="right", fontsize=8, color=GREY,
         )  # fmt: skip
         axes.set_title("Belief over identity")
     return figure

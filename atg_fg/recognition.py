@@ -8,6 +8,8 @@ with one more action and one more observation added as factors.
 
 from __future__ import annotations
 
+import contextlib
+from dataclasses import replace
 from typing import Any
 
 import gtsam
@@ -31,43 +33,55 @@ class RecognitionGraph:
 
     Attributes:
         graph: The ``gtsam.DiscreteFactorGraph``.
-        last: Time t of the last aspect variable.
+        chain: The tables of its factors.
     """
 
     def __init__(self, chain: Chain, n_unseen: int) -> None:
         self.chain = chain
         self.n_unseen = n_unseen
         self.graph: FactorGraph = gtsam.DiscreteFactorGraph()
-        self.last = 0
-        self._widths = [chain.initial.shape[1]]
         self._add([object_key()], chain.prior)
         self._add([object_key(), aspect_key(0)], chain.initial)
-        for transition in chain.transitions:
-            self.act(transition)
+        for time, transition in enumerate(chain.transitions, start=1):
+            self._add([object_key(), aspect_key(time - 1), aspect_key(time)], transition)
         for time, likelihood in enumerate(chain.likelihoods):
-            self.observe(likelihood, time)
-
-    def act(self, transition: FloatArray) -> None:
-        """Add X_{t+1} and the action's factor p(X_{t+1} | X_t, a, O), shape [H, W_t, W_{t+1}]."""
-        self._add([object_key(), aspect_key(self.last), aspect_key(self.last + 1)], transition)
-        self._widths.append(transition.shape[2])
-        self.last += 1
-
-    def observe(self, likelihood: FloatArray, time: int | None = None) -> None:
-        """Add the evidence's factor p(z | X, O), shape [H, W], at ``time`` (now if not given)."""
-        self._add([object_key(), aspect_key(self.last if time is None else time)], likelihood)
+            self._add([object_key(), aspect_key(time)], likelihood)
 
     def _add(self, keys: list[int], table: FloatArray) -> None:
         self.graph.push_back(factors.factor(keys, table))
 
+    @property
+    def last(self) -> int:
+        """Time t of the last aspect variable."""
+        return len(self.chain.transitions)
+
+    def act(self, transition: FloatArray) -> None:
+        """Add X_{t+1} and the action's factor p(X_{t+1} | X_t, a, O), shape [H, W_t, W_{t+1}]."""
+        self._add([object_key(), aspect_key(self.last), aspect_key(self.last + 1)], transition)
+        self.chain = replace(self.chain, transitions=(*self.chain.transitions, transition))
+
+    def observe(self, likelihood: FloatArray) -> None:
+        """Add the factor p(z_t | X_t, O), shape [H, W_t], of evidence about the last aspect.
+
+        Raises:
+            InvalidInputError: There is evidence about it already.
+        """
+        if len(self.chain.likelihoods) > self.last:
+            raise InvalidInputError(f"factor graph: X{self.last} is observed already; expected an action first")
+        self._add([object_key(), aspect_key(self.last)], likelihood)
+        self.chain = replace(self.chain, likelihoods=(*self.chain.likelihoods, likelihood))
+
     def copy(self) -> RecognitionGraph:
         """Return a graph that shares these factors and can be added to alone."""
         twin = RecognitionGraph.__new__(RecognitionGraph)
-        twin.chain, twin.n_unseen, twin.last = self.chain, self.n_unseen, self.last
-        twin._widths = list(self._widths)
+        twin.chain, twin.n_unseen = self.chain, self.n_unseen
         twin.graph = gtsam.DiscreteFactorGraph()
         twin.graph.push_back(self.graph)
         return twin
+
+    def given(self, hypothesis: int) -> RecognitionGraph:
+        """Return the graph under one state of O alone; its evidence is p(O = hypothesis, z_0:t | a_1:t)."""
+        return RecognitionGraph(self.chain.given(hypothesis), self.n_unseen)
 
     def eliminate(self) -> Any:
         """Return the Bayes net p(O) Π p(X_s | X_{s+1}, O) left by eliminating X_0, …, X_t and then O.
@@ -85,22 +99,47 @@ class RecognitionGraph:
     def identity(self) -> IdentityBelief:
         """p(O | z_0:t, a_1:t) (eq. 1 and 2): the marginal of O, which elimination leaves for last."""
         net = self.eliminate()
-        return self._identity_of(net.at(net.size() - 1))
-
-    def _identity_of(self, conditional: Any) -> IdentityBelief:
-        n_hypotheses = len(self.chain.prior)
-        key = object_key()
-        weights = np.array([conditional(factors.values({key: state})) for state in range(n_hypotheses)])
+        marginal = net.at(net.size() - 1)
+        weights = np.array([marginal(factors.values({object_key(): state})) for state in range(len(self.chain.prior))])
+        if not weights.all():
+            weights = self._joint_by_object()[0]
         probabilities = weights / weights.sum()
         return IdentityBelief(probabilities[:-1], float(probabilities[-1]), self.n_unseen)
+
+    def _joint_by_object(self) -> tuple[FloatArray, float]:
+        """Return p(O, z_0:t), divided by its greatest value, shape [H], and the logarithm of that value.
+
+        GTSAM multiplies plain numbers. In a long trial the weight of an object can fall below the least of them and
+        be zero from there on, however well the object explains what comes after. So where elimination of the whole
+        graph leaves a zero, each object is eliminated alone, and their evidence is compared as logarithms.
+        """
+        if len(self.chain.prior) == 1:
+            return np.ones(1), self._log_evidence_of(self.eliminate())
+        logarithms = np.full(len(self.chain.prior), -np.inf)
+        for hypothesis in range(len(logarithms)):
+            with contextlib.suppress(ImpossibleEvidenceError):
+                alone = self.given(hypothesis)
+                logarithms[hypothesis] = alone._log_evidence_of(alone.eliminate())
+        greatest = float(logarithms.max())
+        if not np.isfinite(greatest):
+            raise _impossible()
+        return np.exp(logarithms - greatest), greatest
 
     def novelty(self) -> float:
         """p(O unseen | z_0:t, a_1:t) (eq. 1)."""
         return self.identity().unseen
 
     def log_evidence(self) -> float:
-        """Ln p(z_0:t | a_1:t), from the chain rule: any explanation's ln joint less its ln posterior."""
-        net = self.eliminate()
+        """Return ln p(z_0:t | a_1:t).
+
+        Raises:
+            ImpossibleEvidenceError: The evidence has probability zero.
+        """
+        weights, logarithm = self._joint_by_object()
+        return float(logarithm + np.log(weights.sum()))
+
+    def _log_evidence_of(self, net: Any) -> float:
+        """Return ln p(z) by the chain rule: any explanation's ln joint less its ln posterior in ``net``."""
         explanation = net.sample(gtsam.MT19937(0))
         log_joint = sum(np.log(self.graph.at(index)(explanation)) for index in range(self.graph.size()))
         return float(log_joint - net.logProbability(explanation))
@@ -116,15 +155,20 @@ class RecognitionGraph:
             raise InvalidInputError(f"time: {time!r}; expected 0 to {self.last}")
         # Inwards from both ends of the chain: no elimination couples more than O and two aspects.
         inwards = [*range(time), *range(self.last, time, -1)]
+        sizes = {object_key(): len(self.chain.prior), aspect_key(time): self.chain.widths[time]}
         try:
             _, left = self.graph.eliminatePartialSequential(factors.ordering(map(aspect_key, inwards)))
+            joint = factors.table(left.product(), sizes)
         except RuntimeError as error:
             raise _impossible() from error
-        joint = factors.table(
-            left.product(), {object_key(): len(self.chain.prior), aspect_key(time): self._widths[time]}
-        )
-        if not joint.sum() > 0:
-            raise _impossible()
+        by_object = joint.sum(axis=1)
+        if len(by_object) > 1 and not by_object.all():
+            # As in ``identity``: a zero may be a number too small, so each object is asked alone.
+            weights = np.append(self.identity().objects, self.novelty())
+            possible = np.flatnonzero(weights)
+            joint = np.zeros_like(joint)
+            for hypothesis in possible:
+                joint[hypothesis] = weights[hypothesis] * self.given(int(hypothesis)).aspect_marginal(time)[0]
         marginal: FloatArray = joint / joint.sum()
         return marginal
 
@@ -136,7 +180,7 @@ class RecognitionGraph:
         """Return a variable's (key, cardinality), which is what GTSAM calls a discrete key."""
         if key == object_key():
             return key, factors.cardinality(len(self.chain.prior))
-        return key, factors.cardinality(self._widths[aspect_key(0) - key])
+        return key, factors.cardinality(self.chain.widths[aspect_key(0) - key])
 
     def expected_entropy_by_elimination(self, transition: FloatArray, observations: FloatArray) -> float:
         """Expected entropy (eq. 3) of one action the straightforward way: a graph for every pattern, each eliminated.

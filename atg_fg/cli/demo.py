@@ -48,7 +48,8 @@ def demo(
     memory = RobotMemory(arcube_assumptions())
     begin_trial(engine, memory, parameters)
     # The last cube is the one the robot never meets while it learns.
-    with closing(make_world(world, cubes=make_arcubes(N_REMEMBERED + 1, seed), render_mode="rgb_array")) as made_world:
+    camera = {} if world == "ideal" else {"render_mode": "rgb_array"}
+    with closing(make_world(world, cubes=make_arcubes(N_REMEMBERED + 1, seed), **camera)) as made_world:
         console.print(f"The robot turns {N_REMEMBERED} cubes over and remembers what it sees …")
         _learn(made_world, memory, np.random.default_rng(learn_seed))
         rng = np.random.default_rng(trial_seed)
