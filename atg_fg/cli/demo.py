@@ -81,7 +81,7 @@ def _learn(world: World, memory: RobotMemory, rng: np.random.Generator) -> None:
 
 def _save(folder: Path, world: World, record: TrialRecord, memory: RobotMemory) -> None:
     """Save the last camera frame, the plots, the record, and the memory with what the trial taught."""
-    frame = world.render()
+    frame = world.render() if world.render_mode else None
     if isinstance(frame, np.ndarray):
         figures.save_image(frame, folder / "frame.png")
     beliefs = [step.belief for step in record.steps]

@@ -86,11 +86,15 @@ class Enumeration(Inference):
         return weights * likelihood.reshape(len(weights), *past, likelihood.shape[1])
 
     def _expected_entropies(self) -> FloatArray:
-        """Add every hypothetical action and then every hypothetical pattern, as eq. 3 is written."""
+        """Add every hypothetical action and then every hypothetical pattern, as eq. 3 is written.
+
+        What is to come depends on the past through X_t alone, so explanations that end alike are summed first.
+        """
         entropies = np.zeros(self.model.n_actions)
-        total = self.weights.sum()
+        last = self.weights.sum(axis=tuple(range(1, self.weights.ndim - 1)))
+        total = last.sum()
         for action in range(self.model.n_actions):
-            predicted = self._extended(self.weights, action)
+            predicted = self._extended(last, action)
             for pattern in range(self.model.n_patterns):
                 likelihood = np.zeros(self.model.n_patterns)
                 likelihood[pattern] = 1.0

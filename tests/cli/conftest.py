@@ -1,0 +1,34 @@
+import sys
+
+import pytest
+
+from atg_fg import cli
+
+
+@pytest.fixture
+def run(monkeypatch, capsys):
+    """Run the command line in this process; return its exit status, standard output and standard error."""
+
+    def called(*arguments):
+        monkeypatch.setattr(sys, "argv", ["atg-fg", *map(str, arguments)])
+        with pytest.raises(SystemExit) as left:
+            cli.main()
+        printed = capsys.readouterr()
+        return left.value.code, printed.out, printed.err
+
+    return called
+
+
+@pytest.fixture
+def refused(run):
+    """Run the command line, check that it refuses in the promised way, and return its one line."""
+
+    def called(*arguments):
+        status, output, error = run(*arguments)
+        assert status == 2
+        assert output == ""
+        assert error.count("\n") == 1
+        assert "Traceback" not in error
+        return error
+
+    return called

@@ -1,0 +1,32 @@
+import os
+
+from atg_fg import store
+
+
+def test_the_demo_recognises_an_object_from_camera_images(run, tmp_path):
+    status, output, error = run("demo", "--output", tmp_path / "out", "--actions", "5")
+    assert (status, error) == (0, "")
+    assert "look 0: front" in output
+    assert "expected entropy" in output
+    verdict = output.split("verdict: ")[1].split(" ")[0]
+    assert f"truth:   {verdict}" in output
+    assert sorted(os.listdir(tmp_path / "out")) == [
+        "belief.png",
+        "entropy.png",
+        "frame.png",
+        "memory.json",
+        "trial.jsonl",
+    ]
+    assert len(store.load_memory(tmp_path / "out" / "memory.json")) == 6
+
+
+def test_the_demo_tells_a_new_object(run, tmp_path):
+    status, output, _ = run("demo", "--output", tmp_path, "--novel", "--world", "ideal", "--engine", "bayes-filter")
+    assert status == 0
+    assert "verdict: a new object" in output
+    assert "frame.png" not in os.listdir(tmp_path)
+
+
+def test_a_folder_that_cannot_be_made_is_refused(refused, tmp_path):
+    (tmp_path / "file").write_text("")
+    assert "cannot be written" in refused("demo", "--output", tmp_path / "file" / "out")

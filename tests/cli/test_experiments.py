@@ -1,0 +1,109 @@
+import csv
+import json
+import os
+
+import pytest
+
+from atg_fg.cli.experiments import parse_actions
+from atg_fg.errors import InvalidInputError
+
+QUICK = ["--engine", "bayes-filter", "--trials", "8", "--jobs", "1"]
+
+
+def test_table1_prints_json_in_the_promised_shape(run):
+    status, output, error = run("table1", *QUICK, "--tests", "2", "--actions", "4", "--seed", "7", "--json", "-")
+    assert (status, error) == (0, "")
+    document = json.loads(output)
+    assert document["command"] == "table1"
+    assert document["parameters"]["actions"] == 4
+    assert [test["seed"] for test in document["tests"]] == [7, 8]
+    for test in document["tests"]:
+        assert test["identification"][1] == 8
+        assert 0 <= test["recognition"][0] <= test["recognition"][1]
+        assert 0 <= test["success"] <= 1
+    low, high = document["interval95"]["success"]
+    assert low <= document["average"]["success"] <= high
+
+
+def test_table1_shows_the_papers_row_beside_ours(run):
+    status, output, _ = run("table1", *QUICK, "--tests", "1", "--actions", "3")
+    assert status == 0
+    assert "Correct identification" in output
+    assert "paper" in output
+    assert "79.2%" in output
+    assert "95% interval" in output
+
+
+def test_table1_is_the_same_for_any_number_of_jobs(run, tmp_path):
+    for jobs in (1, 2):
+        run("table1", *QUICK[:-1], jobs, "--tests", "2", "--actions", "3", "--json", tmp_path / f"{jobs}.json")
+    assert (tmp_path / "1.json").read_bytes() == (tmp_path / "2.json").read_bytes()
+
+
+def test_noise_of_the_world_is_an_option(run):
+    arguments = ["--slip", "0.2", "--wrong", "0.1", "--missing", "0.1", "--json", "-"]
+    status, output, _ = run("table1", *QUICK, "--tests", "1", "--actions", "3", *arguments)
+    assert status == 0
+    assert json.loads(output)["parameters"]["slip"] == 0.2
+
+
+def test_figure3_writes_json_csv_and_the_plot(run, tmp_path):
+    files = {name: tmp_path / f"figure3.{name}" for name in ("json", "csv", "png")}
+    status, output, _ = run(
+        "figure3", "--actions", "2,4", "--tests", "1", "--trials", "6", "--jobs", "1",
+        "--json", files["json"], "--csv", files["csv"], "--plot", files["png"],
+    )  # fmt: skip
+    assert status == 0
+    assert "random policy" in output
+    document = json.loads(files["json"].read_text())
+    assert document["command"] == "figure3"
+    assert [(p["actions"], p["policy"]) for p in document["points"]] == [
+        (2, "entropy"),
+        (2, "random"),
+        (4, "entropy"),
+        (4, "random"),
+    ]
+    rows = list(csv.DictReader(files["csv"].read_text().splitlines()))
+    assert [float(row["success"]) for row in rows] == [p["success"] for p in document["points"]]
+    assert files["png"].read_bytes().startswith(b"\x89PNG")
+
+
+def test_numbers_of_actions_are_a_range_or_a_list():
+    assert parse_actions("4:7") == [4, 5, 6, 7]
+    assert parse_actions("10") == [10]
+    assert parse_actions("4,10,6") == [4, 10, 6]
+
+
+@pytest.mark.parametrize("text", ["", "4:", "7:4", "0:3", "0", "a", "4,4", "1:2:3", "1.5"])
+def test_other_numbers_of_actions_are_refused(text):
+    with pytest.raises(InvalidInputError, match=r"--actions: .*expected first:last or a list"):
+        parse_actions(text)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--engine", "magic"], "engine: unknown name 'magic'; expected one of: bayes-filter, enumeration, gtsam"),
+        (["--world", "magic"], "world: unknown name 'magic'; expected one of: ideal, rendered"),
+        (["--world", "nowhere:some/World-v0"], "world 'nowhere:some/World-v0': cannot be made"),
+        (["--preset", "magic"], "preset: unknown name 'magic'; expected one of: default, paper"),
+        (["--policy", "magic"], "policy: unknown name 'magic'; expected one of: entropy, random"),
+        (["--actions", "0"], "--actions: 0; expected a whole number of at least 1"),
+        (["--tests", "-1"], "--tests: -1; expected a whole number of at least 1"),
+        (["--jobs", "0"], "--jobs: 0; expected"),
+        (["--seed", "-1"], "--seed: -1; expected a whole number of at least 0"),
+        (["--slip", "1.5"], "--slip: 1.5; expected a probability from 0 to 1"),
+        (["--wrong", "nan"], "--wrong: nan; expected a probability from 0 to 1"),
+        (["--tests", "x"], "'--tests'"),
+        (["--magic"], "No such option"),
+        (["--json", "no/such/folder/out.json"], "no/such/folder/out.json: cannot be written"),
+    ],
+)
+def test_table1_refuses_bad_input_in_one_line(refused, arguments, message):
+    assert message in refused("table1", *arguments)
+
+
+def test_figure3_refuses_what_it_could_not_write_before_it_starts(refused, tmp_path):
+    assert "suffix 'jpeg'; expected .png" in refused("figure3", "--plot", tmp_path / "figure.jpeg")
+    assert "cannot be written" in refused("figure3", "--csv", tmp_path / "no" / "points.csv")
+    assert os.listdir(tmp_path) == []

@@ -1,0 +1,52 @@
+import io
+import json
+
+import networkx
+import pytest
+
+from atg_fg import store
+from atg_fg.assumptions import arcube_assumptions
+from atg_fg.memory import RobotMemory
+
+
+@pytest.fixture
+def file(tmp_path):
+    memory = RobotMemory(arcube_assumptions())
+    memory.learn([0, 1, 2], [0, 1], matched=None)
+    store.save_memory(memory, tmp_path / "memory.json")
+    return tmp_path / "memory.json"
+
+
+def test_show_lists_what_is_known_of_each_object(run, file):
+    status, output, _ = run("memory", "show", file)
+    assert status == 0
+    assert "object-000" in output
+    status, output, _ = run("memory", "show", file, "--json", "-")
+    (row,) = json.loads(output)["objects"]
+    assert (row["aspects"], row["unobserved"], row["edges"], row["unknown_edges"]) == (3, 21, 2, 7)
+
+
+def test_check_says_that_a_memory_is_sound(run, file):
+    assert run("memory", "check", file)[:2] == (0, f"{file}: sound, 1 ATGs\n")
+
+
+def test_check_names_the_first_fault(refused, file):
+    file.write_text(file.read_text().replace('"count": 1', '"count": -1', 1))
+    assert "memory[0].transitions[0].count: -1; expected a whole number of at least 1" in refused(
+        "memory", "check", file
+    )
+
+
+def test_export_writes_graphml_that_networkx_reads(run, file, tmp_path):
+    status, output, _ = run("memory", "export", file)
+    assert status == 0
+    assert networkx.read_graphml(io.BytesIO(output.encode())).number_of_edges() == 9
+    run("memory", "export", file, "--format", "dot", "--output", tmp_path / "atg.dot")
+    assert (tmp_path / "atg.dot").read_text().startswith("digraph")
+
+
+def test_export_refuses_what_is_not_there(refused, file, tmp_path):
+    assert "unknown name 'cup'; expected one of: object-000" in refused("memory", "export", file, "--name", "cup")
+    assert "--format: 'svg'; expected one of: graphml, dot" in refused("memory", "export", file, "--format", "svg")
+    store.save_memory(RobotMemory(arcube_assumptions()), file)
+    assert "the memory is empty" in refused("memory", "export", file)

@@ -1,0 +1,85 @@
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from atg_fg import store
+from tests.test_scripted_trial import SCRIPT
+
+COMMAND = Path(sys.executable).with_name("atg-fg")
+
+
+@pytest.fixture
+def script(tmp_path):
+    path = tmp_path / "script.json"
+    path.write_text(json.dumps(SCRIPT))
+    return path
+
+
+def test_replay_prints_one_line_of_json_a_file(run, script):
+    status, output, error = run("replay", script, script, "--engine", "bayes-filter")
+    assert (status, error) == (0, "")
+    lines = output.splitlines()
+    assert len(lines) == 2
+    assert lines[0] == lines[1]
+    assert json.loads(lines[0])["engine"] == "bayes-filter"
+
+
+def test_the_installed_command_replays_and_refuses(script, tmp_path):
+    done = subprocess.run([COMMAND, "replay", script, "--smooth"], capture_output=True, text=True, check=True)
+    document = json.loads(done.stdout)
+    assert (document["engine"], document["smoothed"]["object"]) == ("gtsam", "cube-000")
+    (tmp_path / "bad.json").write_text("{")
+    bad = subprocess.run(
+        [COMMAND, "replay", script, tmp_path / "bad.json"], capture_output=True, text=True, check=False
+    )
+    assert (bad.returncode, bad.stdout) == (2, "")
+    assert bad.stderr.count("\n") == 1
+    assert "bad.json: not valid JSON" in bad.stderr
+
+
+def test_replay_has_a_table_for_people(run, script):
+    status, output, _ = run("replay", script, "--table")
+    assert status == 0
+    assert "cube-000" in output
+
+
+def test_every_file_is_checked_before_the_first_is_run(refused, script, tmp_path):
+    assert "absent.json: cannot be read" in refused("replay", script, tmp_path / "absent.json")
+
+
+def test_an_engine_that_would_need_too_much_says_so(refused, tmp_path):
+    steps = [{"observe": [0, 1]}, *[{"act": "flip"}, {"observe": [0, 1]}] * 40]
+    (tmp_path / "long.json").write_text(json.dumps({**SCRIPT, "steps": steps}))
+    assert "engine 'enumeration'" in refused("replay", tmp_path / "long.json", "--engine", "enumeration")
+
+
+def test_a_trial_learns_and_the_next_one_recognises(run, tmp_path):
+    memory, record = tmp_path / "memory.json", tmp_path / "trial.jsonl"
+    quick = ["trial", "--engine", "bayes-filter", "--actions", "12", "--seed", "3", "--save-memory", memory]
+    status, output, _ = run(*quick, "--record", record)
+    assert status == 0
+    assert "verdict: a new object" in output
+    assert store.load_memory(memory).names == ("object-000",)
+    assert json.loads(record.read_text().splitlines()[-1])["verdict"]["judged_novel"]
+    status, output, _ = run(*quick, "--memory", memory, "--json", "-")
+    document = json.loads(output)
+    assert document["matched"] == document["learned"] == "object-000"
+
+
+def test_a_trial_refuses_what_it_could_not_save(refused, tmp_path):
+    assert "cannot be written" in refused("trial", "--record", tmp_path / "no" / "record.jsonl")
+    assert "cannot be read" in refused("trial", "--memory", tmp_path / "absent.json")
+
+
+def test_an_unknown_command_is_refused(refused):
+    assert "No such command 'magic'" in refused("magic")
+
+
+@pytest.mark.parametrize("command", [[], ["table1"], ["figure3"], ["trial"], ["replay"], ["demo"], ["memory", "show"]])
+def test_help_of_every_command_carries_an_example(run, command):
+    status, output, _ = run(*command, "--help")
+    assert status == 0
+    assert not command or "Example: atg-fg" in output

@@ -1,0 +1,105 @@
+import numpy as np
+import pytest
+
+from atg_fg.errors import InvalidInputError, UnknownNameError
+from atg_fg.experiments import TestPlan, TestResult, figure3_points, run_test, run_tests, summarise
+from atg_fg.parameters import ModelParameters, preset
+
+QUICK = TestPlan(engine="bayes-filter", n_trials=30, n_actions=6)
+
+
+def test_the_average_of_table_1_is_the_papers():
+    rows = [((80, 100), (20, 21), 79), ((79, 100), (25, 27), 77), ((87, 100), (21, 25), 83)]
+    rows += [((78, 100), (26, 28), 76), ((84, 100), (24, 27), 81)]
+    summary = summarise(
+        TestResult(seed, identification, recognition, (success, 100))
+        for seed, (identification, recognition, success) in enumerate(rows)
+    )
+    assert {name: round(100 * rate, 1) for name, rate in summary["average"].items()} == {
+        "identification": 81.6,
+        "recognition": 90.7,
+        "success": 79.2,
+    }
+    assert [round(bound, 3) for bound in summary["interval95"]["success"]] == [0.754, 0.825]
+
+
+def test_a_test_counts_what_it_says():
+    records = []
+    result = run_test(QUICK, 0, on_trial=lambda _, record: records.append(record))
+    presented, identified, judged_known = set(), 0, 0
+    for record in records:
+        truth = record.steps[0].truth["object"]
+        identified += record.judged_novel == (truth not in presented)
+        judged_known += truth in presented and not record.judged_novel
+        presented.add(truth)
+    assert len(records) == 30
+    assert result.identification == (identified, 30)
+    assert result.recognition[1] == judged_known
+    n_novel_right = identified - judged_known
+    assert result.success == (n_novel_right + result.recognition[0], 30)
+
+
+def test_the_same_seed_gives_the_same_result_for_any_number_of_jobs():
+    plans = [(QUICK, seed) for seed in range(3)]
+    assert list(run_tests(plans, jobs=1)) == list(run_tests(plans, jobs=2))
+
+
+def test_every_exact_engine_gives_the_same_test():
+    plan = {"n_trials": 12, "n_actions": 4, "parameters": preset("paper")}
+    assert run_test(TestPlan(engine="gtsam", **plan), 1) == run_test(TestPlan(engine="bayes-filter", **plan), 1)
+
+
+def test_a_world_that_shows_nothing_teaches_nothing():
+    result = run_test(TestPlan(engine="bayes-filter", world_options={"missing": 1.0}, n_trials=5), 0)
+    assert result.recognition == (0, 0)
+    assert summarise([result])["average"]["recognition"] is None
+
+
+def test_learning_within_the_trial_beats_the_literal_model_on_the_same_seeds():
+    rates = {}
+    for name in ("paper", "default"):
+        plan = TestPlan(engine="bayes-filter", parameters=preset(name))
+        rates[name] = np.mean([test.success[0] / test.success[1] for test in run_tests([(plan, s) for s in range(3)])])
+    assert rates["default"] > rates["paper"] + 0.03
+
+
+@pytest.mark.slow
+def test_the_paper_preset_reproduces_table_1_and_the_default_one_beats_it():
+    averages = {}
+    for name in ("paper", "default"):
+        plan = TestPlan(engine="bayes-filter", parameters=preset(name))
+        averages[name] = summarise(run_tests([(plan, seed) for seed in range(40)], jobs=2))["average"]["success"]
+    assert 0.754 <= averages["paper"] <= 0.825
+    assert averages["default"] >= 0.9
+
+
+def test_figure_3_has_a_point_for_each_policy_and_number_of_actions():
+    done = []
+    plan = TestPlan(engine="bayes-filter", n_trials=10)
+    points = figure3_points(plan, [2, 4], ("entropy", "random"), range(2), on_test=lambda: done.append(1))
+    assert [(point["actions"], point["policy"]) for point in points] == [
+        (2, "entropy"),
+        (2, "random"),
+        (4, "entropy"),
+        (4, "random"),
+    ]
+    assert len(done) == 8
+    for point in points:
+        assert point["interval95"][0] <= point["success"] <= point["interval95"][1]
+
+
+@pytest.mark.parametrize("sizes", [{"n_actions": 0}, {"n_trials": 0}, {"n_objects": -1}])
+def test_a_plan_of_nothing_is_refused(sizes):
+    with pytest.raises(InvalidInputError, match="expected a whole number of at least 1"):
+        TestPlan(**sizes)
+
+
+def test_unknown_names_are_refused_before_any_work():
+    with pytest.raises(UnknownNameError, match="engine"):
+        TestPlan(engine="magic")
+    with pytest.raises(UnknownNameError, match="policy"):
+        TestPlan(policy="magic")
+    with pytest.raises(UnknownNameError, match="world"):
+        run_test(TestPlan(world="magic", parameters=ModelParameters()), 0)
+    with pytest.raises(InvalidInputError, match="jobs: 0"):
+        next(run_tests([(QUICK, 0)], jobs=0))
