@@ -1,6 +1,50 @@
-"""Aspect Transition Graphs as discrete factor graphs."""
+"""Aspect Transition Graphs as discrete factor graphs: recognise objects by acting on them."""
 
-from atg_fg import worlds  # registers the worlds with gymnasium
+from atg_fg.assumptions import Assumptions, arcube_assumptions
+from atg_fg.belief import IdentityBelief
+from atg_fg.engines import ENGINES, begin_trial
+from atg_fg.engines.base import Inference
+from atg_fg.errors import AtgError
+from atg_fg.experiments import TestPlan, TestResult, run_test, run_tests, summarise
+from atg_fg.graph import AspectTransitionGraph
+from atg_fg.memory import RobotMemory
+from atg_fg.parameters import PRESETS, ModelParameters, preset
+from atg_fg.patterns import Evidence, PatternAlphabet
+from atg_fg.policies import POLICIES, make_policy
+from atg_fg.recognition import RecognitionGraph
+from atg_fg.store import load_memory, save_memory
+from atg_fg.trial import TrialRecord, run_trial
+from atg_fg.worlds import WORLDS, make_world
 
 __version__ = "0.1.0"
-__all__ = ["worlds"]
+
+__all__ = [
+    "ENGINES",
+    "POLICIES",
+    "PRESETS",
+    "WORLDS",
+    "AspectTransitionGraph",
+    "Assumptions",
+    "AtgError",
+    "Evidence",
+    "IdentityBelief",
+    "Inference",
+    "ModelParameters",
+    "PatternAlphabet",
+    "RecognitionGraph",
+    "RobotMemory",
+    "TestPlan",
+    "TestResult",
+    "TrialRecord",
+    "arcube_assumptions",
+    "begin_trial",
+    "load_memory",
+    "make_policy",
+    "make_world",
+    "preset",
+    "run_test",
+    "run_tests",
+    "run_trial",
+    "save_memory",
+    "summarise",
+]

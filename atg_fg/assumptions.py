@@ -35,6 +35,8 @@ class Assumptions:
             value = getattr(self, field)
             if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= MAX_NUMBER:
                 raise InvalidInputError(f"{field}: {value!r}; expected a whole number from 1 to 2^53")
+        if isinstance(self.actions, str) or not all(isinstance(name, str) for name in self.actions):
+            raise InvalidInputError(f"actions: {self.actions!r}; expected a tuple of names")
         if not self.actions or len(set(self.actions)) != len(self.actions):
             raise InvalidInputError(f"actions: {list(self.actions)!r}; expected at least one name, all different")
         if self.n_aspects > len(self.alphabet):

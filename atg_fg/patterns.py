@@ -45,6 +45,10 @@ class PatternAlphabet:
     def __post_init__(self) -> None:
         if not self.slots or len(set(self.slots)) != len(self.slots):
             raise InvalidInputError(f"slots: {list(self.slots)!r}; expected at least one name, all different")
+        if isinstance(self.slots, str) or not all(isinstance(slot, str) for slot in self.slots):
+            raise InvalidInputError(f"slots: {self.slots!r}; expected a tuple of names")
+        if isinstance(self.n_symbols, bool) or not isinstance(self.n_symbols, int):
+            raise InvalidInputError(f"n_symbols: {self.n_symbols!r}; expected a whole number")
         if self.n_symbols < len(self.slots):
             raise InvalidInputError(
                 f"n_symbols: {self.n_symbols}; expected at least one symbol for each of {len(self.slots)} slots"
@@ -147,9 +151,21 @@ class Evidence:
         Raises:
             InvalidInputError: Wrong shape, a negative or non-finite entry, or all zero.
         """
-        vector = np.array(likelihood, dtype=np.float64)
-        if vector.shape != (len(alphabet),):
-            raise InvalidInputError(f"evidence: shape {vector.shape}; expected ({len(alphabet)},)")
-        if not np.all(np.isfinite(vector)) or np.any(vector < 0) or not np.any(vector > 0):
-            raise InvalidInputError("evidence: expected finite non-negative numbers, at least one of them positive")
-        return cls(vector)
+        try:
+            evidence = cls(np.array(likelihood, dtype=np.float64))
+        except (TypeError, ValueError) as error:
+            raise InvalidInputError(f"evidence: {likelihood!r}; expected numbers") from error
+        evidence.check(len(alphabet))
+        if not evidence.likelihood.any():
+            raise InvalidInputError("evidence: all zero; expected at least one pattern that it is possible under")
+        return evidence
+
+    def check(self, n_patterns: int) -> None:
+        """Raise ``InvalidInputError`` if this is no likelihood over ``n_patterns`` patterns."""
+        if self.likelihood.shape != (n_patterns,):
+            raise InvalidInputError(f"evidence: shape {self.likelihood.shape}; expected ({n_patterns},)")
+        total = self.likelihood.sum()
+        if not (self.likelihood.min() >= 0 and total < np.inf):
+            raise InvalidInputError(
+                f"evidence: least {self.likelihood.min()}, sum {total}; expected non-negative numbers with a finite sum"
+            )

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Final
+from typing import Any, Final
 
 import cv2
 import numpy as np
@@ -70,7 +70,7 @@ def detect_markers(frame: NDArray[np.uint8], camera: Camera) -> list[Marker]:
     return [_located(corners.reshape(4, 2), symbol, camera) for corners, symbol in found if symbol < N_TAGS]
 
 
-def _located(corners: NDArray[np.float32], symbol: int, camera: Camera) -> Marker:
+def _located(corners: NDArray[Any], symbol: int, camera: Camera) -> Marker:
     # Of the two poses that show a square alike, OpenCV puts the one with the smaller error first.
     _, rotations, translations, _ = cv2.solvePnPGeneric(
         _CORNERS, corners, camera.intrinsics, None, flags=cv2.SOLVEPNP_IPPE_SQUARE

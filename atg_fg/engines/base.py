@@ -44,8 +44,7 @@ class Inference(ABC):
         """
         if not self.history.awaits_evidence:
             raise InvalidInputError("trial: two observations in a row; expected an action between them")
-        if evidence.likelihood.shape != (self.model.n_patterns,):
-            raise InvalidInputError(f"evidence: shape {evidence.likelihood.shape}; expected ({self.model.n_patterns},)")
+        evidence.check(self.model.n_patterns)
         self._update(self.model.likelihood(evidence))
         self.history.evidence.append(evidence)
         revelation = self.history.learn(self.model)
@@ -60,7 +59,8 @@ class Inference(ABC):
         """
         if self.history.awaits_evidence:
             raise InvalidInputError("trial: an action without an observation before it; expected an observation")
-        if isinstance(action, bool) or not 0 <= action < self.model.n_actions:
+        whole = isinstance(action, (int, np.integer)) and not isinstance(action, bool)
+        if not whole or not 0 <= action < self.model.n_actions:
             raise InvalidInputError(f"action: {action!r}; expected 0 to {self.model.n_actions - 1}")
         self._predict(int(action))
         self.history.actions.append(int(action))
@@ -88,12 +88,30 @@ class Inference(ABC):
     def log_evidence(self) -> float:
         """Ln p(z_0:t | a_1:t)."""
 
-    @abstractmethod
     def smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
         """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s, each of shape [W_s].
 
         State 0 is the collection node, state 1 + k the k-th known aspect.
+
+        Raises:
+            InvalidInputError: There is no such hypothesis, or nothing was observed yet.
+            ImpossibleEvidenceError: The evidence has probability zero under this hypothesis.
         """
+        if not 0 <= hypothesis < self.model.n_hypotheses:
+            raise InvalidInputError(f"hypothesis: {hypothesis}; expected 0 to {self.model.n_hypotheses - 1}")
+        if not self.history.evidence:
+            raise InvalidInputError("smoothed aspects: nothing observed yet; expected a first observation")
+        marginals = self._smoothed_aspects(hypothesis)
+        if not all(marginal.sum() > 0 for marginal in marginals):
+            raise ImpossibleEvidenceError(
+                f"smoothed aspects: the evidence has probability zero under hypothesis {hypothesis}; "
+                "expected one that is possible"
+            )
+        return marginals
+
+    @abstractmethod
+    def _smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
+        """Return ``smoothed_aspects``, or zeros, of a hypothesis that there is."""
 
     @abstractmethod
     def _update(self, likelihood: FloatArray) -> None:

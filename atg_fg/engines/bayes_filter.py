@@ -60,7 +60,7 @@ class BayesFilter(FilterInference):
         )
         return expected_entropies(model, joint, float(total[-1]))
 
-    def smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
+    def _smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
         """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s by forward-backward."""
         return forward_backward(self.chain(hypothesis))
 

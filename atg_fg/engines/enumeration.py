@@ -16,10 +16,12 @@ from atg_fg.patterns import Evidence, FloatArray
 
 #: Most explanations (O, X_0:t) that are enumerated: 160 MB of weights.
 MAX_EXPLANATIONS = 20_000_000
+#: Most axes of a NumPy array.
+MAX_AXES = 64
 
 
 class Enumeration(Inference):
-    """Keeps p(o, x_0, …, x_t, z_0:t | a_1:t) of every explanation, shape [H, W_0, …, W_t].
+    """Keeps p(o, x_0, …, x_t | z_0:t, a_1:t) of every explanation, shape [H, W_0, …, W_t].
 
     Raises:
         TooLargeError: A step would need over ``MAX_EXPLANATIONS`` weights.
@@ -31,6 +33,7 @@ class Enumeration(Inference):
     def __init__(self, memory: RobotMemory, parameters: ModelParameters) -> None:
         super().__init__(memory, parameters)
         self.weights: FloatArray = self.model.prior[:, None] * self.model.base
+        self._log_scale = 0.0
 
     def identity(self) -> IdentityBelief:
         """Return p(O | z_0:t, a_1:t) (eq. 1 and 2)."""
@@ -39,11 +42,11 @@ class Enumeration(Inference):
     @property
     def log_evidence(self) -> float:
         """Ln p(z_0:t | a_1:t)."""
-        return float(np.log(self.weights.sum()))
+        return self._log_scale
 
-    def smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
+    def _smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
         """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s."""
-        weights = self.weights[hypothesis] / self.weights[hypothesis].sum()
+        weights = self.weights[hypothesis] / (self.weights[hypothesis].sum() or 1.0)
         times = range(weights.ndim)
         return [weights.sum(axis=tuple(other for other in times if other != time)) for time in times]
 
@@ -53,12 +56,14 @@ class Enumeration(Inference):
 
     def _update(self, likelihood: FloatArray) -> None:
         weights = self._times_last(self.weights, likelihood)
-        if not weights.sum() > 0:
+        total = weights.sum()
+        if not total > 0:
             raise ImpossibleEvidenceError(
                 f"observation {len(self.history.evidence)}: the evidence has probability zero under the model; "
                 "expected evidence that some object could give, or noise above 0"
             )
-        self.weights = weights
+        self.weights = weights / total
+        self._log_scale += float(np.log(total))
 
     def _divide(self, revelation: Revelation) -> None:
         padding = [(0, 0)] * (self.weights.ndim - 1) + [(0, self.model.n_states - self.weights.shape[-1])]
@@ -71,10 +76,11 @@ class Enumeration(Inference):
 
     def _extended(self, weights: FloatArray, action: int) -> FloatArray:
         """Every explanation followed by every next aspect, shape [H, W_0, …, W_t, W_t+1]."""
-        if weights.size * self.model.n_states > MAX_EXPLANATIONS:
+        if weights.size * self.model.n_states > MAX_EXPLANATIONS or weights.ndim == MAX_AXES:
             raise TooLargeError(
-                f"engine 'enumeration': {weights.size * self.model.n_states} explanations at observation "
-                f"{len(self.history.evidence)}; expected at most {MAX_EXPLANATIONS}, so use another engine"
+                f"engine 'enumeration': {weights.size * self.model.n_states} explanations after "
+                f"{len(self.history.evidence)} observations; expected at most {MAX_EXPLANATIONS} and at most "
+                f"{MAX_AXES - 1} observations, so use another engine"
             )
         transition = self.model.transition(action)
         past = (1,) * (weights.ndim - 2)

@@ -55,7 +55,7 @@ class GtsamElimination(FilterInference):
         """Return the whole factor graph of the trial so far, with O, X0 … Xt."""
         return RecognitionGraph(self.chain(), n_unseen=self.model.n_unseen)
 
-    def smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
+    def _smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
         """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s, from the graph given O."""
         graph = RecognitionGraph(self.chain(hypothesis), n_unseen=1)
         return [graph.aspect_marginal(time)[0] for time in range(graph.last + 1)]

@@ -1,0 +1,43 @@
+"""The small worlds that tests by hand are about."""
+
+from __future__ import annotations
+
+from atg_fg.assumptions import Assumptions
+from atg_fg.engines import begin_trial
+from atg_fg.engines.base import Inference
+from atg_fg.graph import AspectTransitionGraph
+from atg_fg.memory import RobotMemory
+from atg_fg.parameters import ModelParameters
+from atg_fg.patterns import Evidence, PatternAlphabet
+
+
+def one_slot(n_objects: int, n_aspects: int, n_symbols: int, actions: tuple[str, ...] = ("push",)) -> Assumptions:
+    """Aspects that show one symbol each, so that a pattern and its index are the same number."""
+    return Assumptions(n_objects, n_aspects, actions, PatternAlphabet(("front",), n_symbols))
+
+
+def graph(
+    assumptions: Assumptions, name: str, aspects: list[tuple[int, ...]], *edges: tuple[int, int, int, int]
+) -> AspectTransitionGraph:
+    """A graph with these aspects and (source, action, target, count) edges."""
+    result = AspectTransitionGraph(name, assumptions)
+    for pattern in aspects:
+        result.add_aspect(pattern)
+    for edge in edges:
+        result.add_transition(*edge)
+    return result
+
+
+def seen(assumptions: Assumptions, *symbols: int | None) -> Evidence:
+    return Evidence.of_detection(assumptions.alphabet, symbols)
+
+
+def trial(engine: str, memory: RobotMemory, parameters: ModelParameters, *steps: int) -> Inference:
+    """A trial in a world of one slot: symbol, action, symbol, action, …"""
+    inference = begin_trial(engine, memory, parameters)
+    for number, step in enumerate(steps):
+        if number % 2:
+            inference.act(step)
+        else:
+            inference.observe(seen(memory.assumptions, step))
+    return inference

@@ -1,0 +1,42 @@
+from math import inf, nan
+
+import numpy as np
+import pytest
+
+from atg_fg.errors import InvalidInputError, UnknownNameError
+from atg_fg.parameters import PRESETS, ModelParameters, preset
+
+
+@pytest.mark.parametrize("alpha", [-1e-9, -1, nan, inf, -inf, "1", None, True, 10**400])
+def test_a_concentration_that_is_no_finite_number_of_at_least_zero_is_refused(alpha: object) -> None:
+    with pytest.raises(InvalidInputError, match="transition_concentration"):
+        ModelParameters(transition_concentration=alpha)
+
+
+@pytest.mark.parametrize("delta", [-1e-9, 1, 1.0, 2, nan, inf, "0.1", None, False])
+def test_a_noise_outside_zero_to_below_one_is_refused(delta: object) -> None:
+    with pytest.raises(InvalidInputError, match="observation_noise"):
+        ModelParameters(observation_noise=delta)
+
+
+@pytest.mark.parametrize("learn", [0, 1, "yes", None])
+def test_learning_is_on_or_off_and_nothing_else(learn: object) -> None:
+    with pytest.raises(InvalidInputError, match="learn_in_trial"):
+        ModelParameters(learn_in_trial=learn)
+
+
+@pytest.mark.parametrize(("alpha", "delta"), [(0, 0), (0.0, 0.999), (5, 1e-300), (np.float64(0.5), np.float64(0.5))])
+def test_whole_numbers_and_bounds_are_accepted(alpha: float, delta: float) -> None:
+    parameters = ModelParameters(alpha, delta)
+    assert (parameters.transition_concentration, parameters.observation_noise) == (alpha, delta)
+
+
+def test_presets_are_those_of_the_model_page() -> None:
+    assert preset("paper") == ModelParameters(1e-8, 1e-8, learn_in_trial=False)
+    assert preset("default") == ModelParameters(1e-8, 1e-8, learn_in_trial=True)
+    assert ModelParameters() == PRESETS["default"]
+
+
+def test_an_unknown_preset_is_refused_with_the_names_there_are() -> None:
+    with pytest.raises(UnknownNameError, match="default, paper"):
+        preset("Paper")

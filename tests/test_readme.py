@@ -1,0 +1,63 @@
+"""What README tells a newcomer is true: its commands run, its Python runs, and its map names every file."""
+
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+README = (ROOT / "README.md").read_text()
+TOUR = README.split("## What it does")[1].split("## Results")[0]
+COMMANDS = [line.split("#")[0].strip() for line in re.search(r"```sh\n(.*?)```", TOUR, re.DOTALL)[1].splitlines()]
+#: What makes a command of the tour short enough for a test; the command is otherwise as it is printed.
+SHORTER = {"table1": ["--tests", "1", "--trials", "5"], "figure3": ["--trials", "4"], "demo": ["--actions", "3"]}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    made = tmp_path_factory.mktemp("tour")
+    (made / "tests").symlink_to(ROOT / "tests")
+    return made
+
+
+def test_the_commands_of_the_tour_run_in_their_order(folder):
+    assert len(COMMANDS) >= 7
+    for command in COMMANDS:
+        program, name, *arguments = shlex.split(command)
+        assert program == "atg-fg"
+        script = Path(sys.executable).with_name(program)
+        done = subprocess.run(
+            [script, name, *arguments, *SHORTER.get(name, [])], cwd=folder, capture_output=True, text=True, check=False
+        )
+        assert done.returncode == 0, f"{command}: {done.stderr}"
+    assert {"memory.json", "trial.jsonl", "atg.dot", "figure3.png", "out"} <= {path.name for path in folder.iterdir()}
+
+
+def test_the_python_of_the_tour_runs(capsys):
+    code = re.search(r"```python\n(.*?)```", TOUR, re.DOTALL)[1]
+    exec(compile(code, "README.md", "exec"), {})
+    assert "1.0" in capsys.readouterr().out
+
+
+def test_the_map_names_every_module_and_every_name_in_it_is_there():
+    tree = README.split("## Map")[1].split("```")[1]
+    named = set(re.findall(r"\b(\w+)\.py\b", tree))
+    modules = [path for package in ("atg_fg", "sim") for path in (ROOT / package).glob("*.py")]
+    there = {path.stem for path in modules if path.stem != "__init__"}
+    assert there <= named
+    assert named <= there | {"base", "oracle"}
+
+
+def test_every_link_and_picture_is_there():
+    for target in re.findall(r"\]\(([^)]+)\)", README):
+        assert target.startswith("https://") or (ROOT / target).exists(), target
+
+
+def test_commands_of_the_results_are_those_of_make_results():
+    makefile = (ROOT / "Makefile").read_text()
+    results = README.split("## Results")[1].split("## Engines")[0]
+    for command in re.search(r"```sh\n(.*?)```", results, re.DOTALL)[1].splitlines():
+        assert command in makefile
