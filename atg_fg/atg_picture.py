@@ -117,7 +117,9 @@ def _draw_observed(axes: Axes, graph: AspectTransitionGraph, places: FloatArray)
         if source == target:
             label = _draw_loop(axes, places[source], number, _color(action))
         else:
-            bend = 0.16 + 0.13 * number
+            # A straight way through the middle would be hidden by the collection node.
+            through_middle = np.linalg.norm(places[source] + places[target]) < 1.0
+            bend = 0.16 + 0.13 * number + 0.4 * bool(through_middle and graph.n_unobserved)
             _arrow(axes, places[source], places[target], bend, 0.66, color=_color(action), linewidth=1.6)
             span = places[target] - places[source]
             label = (places[source] + places[target]) / 2 + bend / 2 * np.array([span[1], -span[0]])

@@ -16,7 +16,7 @@ from atg_fg.patterns import FloatArray
 from atg_fg.worlds import ARcubeWorld
 from sim.camera import Camera, Light
 from sim.cube_body import CUBE_SIZE, CubeBody, rotation_of
-from sim.detection import Marker, detect_markers, detected_symbols
+from sim.detection import Marker, detect_markers, detected_symbols, draw_detections
 
 #: Where the cube's centre stands when nothing is jittered, m.
 CUBE_CENTRE: Final = np.array([0.42, 0.0, 0.30])
@@ -37,14 +37,15 @@ class RenderedARcubeWorld(ARcubeWorld):
         light_jitter: How much the light may change at each look, 0 (not at all) to 1.
         image_noise: Standard deviation of noise on each grey level (0 to 255).
         blur: Standard deviation of a Gaussian blur, pixels.
-        render_mode: ``"rgb_array"``, or ``None``.
+        render_mode: ``"rgb_array"`` for the camera frame, ``"detections"`` for the frame with the detected tags
+            outlined, or ``None``.
 
     Attributes:
         frame: The last camera frame, RGB, shape [height, width, 3].
         markers: What was detected in it.
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 1}  # noqa: RUF012
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array", "detections"], "render_fps": 1}  # noqa: RUF012
 
     def __init__(
         self,
@@ -80,7 +81,9 @@ class RenderedARcubeWorld(ARcubeWorld):
 
     def render(self) -> NDArray[np.uint8] | None:
         """Return the last camera frame, RGB, shape [height, width, 3]; ``None`` without a render mode."""
-        return self.frame.copy() if self.render_mode == "rgb_array" else None
+        if self.render_mode is None:
+            return None
+        return self.frame.copy() if self.render_mode == "rgb_array" else draw_detections(self.frame, self.markers)
 
     def close(self) -> None:
         """Leave PyBullet; the world cannot be used any more."""

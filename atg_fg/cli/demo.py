@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from contextlib import closing
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any, Final
 
 import numpy as np
 import typer
@@ -23,6 +23,8 @@ from atg_fg.trial import TrialRecord, run_trial
 from atg_fg.worlds import World, make_world
 
 N_REMEMBERED = 6
+#: Options of the worlds that have a camera whose last frame is to be saved.
+CAMERAS: Final[dict[str, dict[str, Any]]] = {"rendered": {"render_mode": "detections", "image_size": (640, 480)}}
 
 
 def demo(
@@ -48,7 +50,7 @@ def demo(
     memory = RobotMemory(arcube_assumptions())
     begin_trial(engine, memory, parameters)
     # The last cube is the one the robot never meets while it learns.
-    camera = {} if world == "ideal" else {"render_mode": "rgb_array"}
+    camera = CAMERAS.get(world, {})
     with closing(make_world(world, cubes=make_arcubes(N_REMEMBERED + 1, seed), **camera)) as made_world:
         console.print(f"The robot turns {N_REMEMBERED} cubes over and remembers what it sees …")
         _learn(made_world, memory, np.random.default_rng(learn_seed))

@@ -134,6 +134,13 @@ def test_render_gives_the_frame_of_the_last_look(make):
     assert make().render() is None
 
 
+def test_render_can_outline_what_was_detected(make):
+    world = make(render_mode="detections")
+    world.reset(seed=0)
+    assert world.render().shape == world.frame.shape
+    assert (world.render() != world.frame).any()
+
+
 @pytest.mark.parametrize("option", ["position_jitter", "yaw_jitter", "light_jitter", "image_noise", "blur"])
 @pytest.mark.parametrize("value", [-0.1, float("nan"), float("inf")])
 def test_jitter_that_is_no_number_from_zero_is_refused(option, value):
@@ -142,7 +149,7 @@ def test_jitter_that_is_no_number_from_zero_is_refused(option, value):
 
 
 def test_an_unknown_render_mode_is_refused():
-    with pytest.raises(UnknownNameError, match="'human'; expected one of: rgb_array"):
+    with pytest.raises(UnknownNameError, match="'human'; expected one of: detections, rgb_array"):
         RenderedARcubeWorld(render_mode="human")
 
 
