@@ -49,17 +49,21 @@ def key_name(key: int) -> str:
     return "Z" if key == HYPOTHETICAL_KEY else f"X{_FIRST_ASPECT_KEY - key}"
 
 
+def names(keys: Iterable[int]) -> str:
+    """Return the names of variables in one text, such as "O, X0"."""
+    return ", ".join(key_name(key) for key in keys)
+
+
 def factor(keys: Sequence[int], table: FloatArray) -> Factor:
     """Return a factor on ``keys`` with the values of ``table``, one axis a key.
 
     Raises:
         InvalidInputError: Not one axis a key, an empty axis, or a value that is negative or not finite.
     """
-    names = ", ".join(key_name(key) for key in keys)
     if table.ndim != len(keys) or 0 in table.shape:
-        raise InvalidInputError(f"factor on ({names}): shape {table.shape}; expected one axis a variable, none empty")
+        raise InvalidInputError(f"factor on ({names(keys)}): shape {table.shape}; expected one axis a variable, none empty")
     if not (table.min() >= 0 and table.max() < np.inf):  # false for NaN, too
-        raise InvalidInputError(f"factor on ({names}): expected finite values of at least 0")
+        raise InvalidInputError(f"factor on ({names(keys)}): expected finite values of at least 0")
     if 1 in table.shape:
         table = np.pad(table, [(0, cardinality(size) - size) for size in table.shape])
     return gtsam.DecisionTreeFactor(list(zip(keys, table.shape, strict=True)), table.ravel().tolist())

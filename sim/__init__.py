@@ -5,7 +5,6 @@ Importing this package registers its worlds with gymnasium; PyBullet and OpenCV 
 
 from __future__ import annotations
 
-import ctypes
 import importlib
 import importlib.util
 import os
@@ -39,21 +38,20 @@ def make_rendered_arcube(**options: Any) -> gymnasium.Env[Any, Any]:
 
 
 def _import_quietly(module: str) -> None:
-    """Import a module that prints a banner from C, without the banner.
+    """Import a module that prints a banner from C on standard error, without the banner.
 
-    Standard output is for results: ``--json -`` must print JSON and nothing else.
+    What comes there from this project is a fault, in one line.
     """
     if module in sys.modules:
         return
-    sys.stdout.flush()
-    standard_output, nowhere = os.dup(1), os.open(os.devnull, os.O_WRONLY)
+    sys.stderr.flush()
+    standard_error, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
     try:
-        os.dup2(nowhere, 1)
+        os.dup2(nowhere, 2)
         importlib.import_module(module)
-        ctypes.CDLL(None).fflush(None)  # C keeps the banner in a buffer of its own
     finally:
-        os.dup2(standard_output, 1)
-        os.close(standard_output)
+        os.dup2(standard_error, 2)
+        os.close(standard_error)
         os.close(nowhere)
 
 
