@@ -61,7 +61,9 @@ def factor(keys: Sequence[int], table: FloatArray) -> Factor:
         InvalidInputError: Not one axis a key, an empty axis, or a value that is negative or not finite.
     """
     if table.ndim != len(keys) or 0 in table.shape:
-        raise InvalidInputError(f"factor on ({names(keys)}): shape {table.shape}; expected one axis a variable, none empty")
+        raise InvalidInputError(
+            f"factor on ({names(keys)}): shape {table.shape}; expected one axis a variable, none empty"
+        )
     if not (table.min() >= 0 and table.max() < np.inf):  # false for NaN, too
         raise InvalidInputError(f"factor on ({names(keys)}): expected finite values of at least 0")
     if 1 in table.shape:
