@@ -1,5 +1,6 @@
 """Aspect Transition Graphs as discrete factor graphs: recognise objects by acting on them."""
 
+from atg_fg.arcube import make_arcubes
 from atg_fg.assumptions import Assumptions, arcube_assumptions
 from atg_fg.belief import IdentityBelief
 from atg_fg.engines import ENGINES, begin_trial
@@ -39,6 +40,7 @@ __all__ = [
     "arcube_assumptions",
     "begin_trial",
     "load_memory",
+    "make_arcubes",
     "make_policy",
     "make_world",
     "preset",

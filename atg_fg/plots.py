@@ -29,7 +29,7 @@ class _End(NamedTuple):
     y: float
     text: str
     color: str
-    italic: bool = False
+    look: str = "bold"
 
 
 def plot_belief(beliefs: Sequence[IdentityBelief], names: Sequence[str], *, top: int = 5) -> Figure:
@@ -52,7 +52,10 @@ def plot_belief(beliefs: Sequence[IdentityBelief], names: Sequence[str], *, top:
     with plot_style():
         figure, axes = _figure_with_axes(7.2, 3.9)
         axes.axhline(0.5, color=GREY, linewidth=1, linestyle=(0, (2, 2)), zorder=1)
-        ends = [_End(float(unseen[-1]), f"unseen {unseen[-1]:.2f}", INK, italic=True)]
+        ends = [
+            _End(float(unseen[-1]), f"unseen {unseen[-1]:.2f}", INK, "bold italic"),
+            _End(0.5, "novel if unseen is above", GREY, "small"),
+        ]
         for rank, index in enumerate(order):
             color = PALETTE[rank % len(PALETTE)]
             dashes = "solid" if rank < len(PALETTE) else "dashed"
@@ -62,10 +65,6 @@ def plot_belief(beliefs: Sequence[IdentityBelief], names: Sequence[str], *, top:
         axes.set(ylim=(-0.02, 1.02), ylabel="probability")
         _step_axis(axes, len(beliefs))
         _label_ends(axes, ends)
-        axes.annotate(
-            "novel if unseen is above", (1, 0.5), (-3, 3), textcoords="offset points",
-            xycoords=axes.get_yaxis_transform(), ha="right", fontsize=8, color=GREY,
-        )  # fmt: skip
         axes.set_title("Belief over identity")
     return figure
 
@@ -86,12 +85,12 @@ def plot_entropy(entropies: Sequence[float], expected: Sequence[Mapping[str, flo
     _check_entropies(entropies, expected, chosen)
     actions = list(dict.fromkeys(action for options in expected for action in options))
     with plot_style():
-        figure, axes = _figure_with_axes(7.2, 3.9)
-        axes.plot(range(len(entropies)), entropies, color=INK, marker="o", markersize=4.5, label="entropy H(O)")
+        figure, axes = _figure_with_axes(7.8, 4.1)
+        axes.plot(range(len(entropies)), entropies, color="#555555", marker="o", markersize=4, label="entropy H(O)")
         for rank, action in enumerate(actions):
             _plot_expected(axes, rank, len(actions), action, expected, chosen)
         if actions:
-            axes.plot([], [], "o", markersize=9, markerfacecolor="none", color=INK, label="chosen")
+            axes.plot([], [], "o", markersize=7, color=GREY, label="chosen (filled)")
         axes.set(ylabel="entropy (nats)")
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
         _step_axis(axes, len(entropies))
@@ -141,10 +140,8 @@ def _figure_with_axes(width: float, height: float) -> tuple[Figure, Axes]:
 
 def _step_axis(axes: Axes, length: int) -> None:
     """Make x the number of actions taken, 0 to ``length`` − 1, in whole numbers."""
-    from matplotlib.ticker import MaxNLocator
-
-    axes.xaxis.set_major_locator(MaxNLocator(integer=True, nbins=12))
-    axes.set(xlim=(-0.3, length - 1 + 0.15), xlabel="actions taken")
+    axes.set_xticks(range(0, length, max(1, round(length / 12))))
+    axes.set(xlim=(-0.3, max(length - 1, 0.3) + 0.15), xlabel="actions taken")
 
 
 def _plot_expected(
@@ -158,16 +155,13 @@ def _plot_expected(
     """Mark what one action was expected to leave, just left of its outcome and apart from the others."""
     color, shape = PALETTE[rank % len(PALETTE)], "s^Dvp*"[rank % 6]
     shift = 0.16 + 0.5 * (n_actions - 1 - rank) / max(n_actions, 3)
-    steps = [step for step, options in enumerate(expected) if action in options]
-    taken = [step for step in steps if chosen[step] == action]
-    axes.plot(
-        [step + 1 - shift for step in steps], [expected[step][action] for step in steps],
-        shape, color=color, markersize=5, markeredgecolor="none", label=f"expected of {action}",
-    )  # fmt: skip
-    axes.plot(
-        [step + 1 - shift for step in taken], [expected[step][action] for step in taken],
-        "o", markersize=10, markerfacecolor="none", markeredgecolor=INK, markeredgewidth=1.3,
-    )  # fmt: skip
+    for taken in (False, True):
+        steps = [t for t, options in enumerate(expected) if action in options and (chosen[t] == action) == taken]
+        axes.plot(
+            [t + 1 - shift for t in steps], [expected[t][action] for t in steps], shape, zorder=4,
+            markersize=7 if taken else 5, markeredgecolor=color, markerfacecolor=color if taken else "white",
+            label=None if taken else f"expected of {action}",
+        )  # fmt: skip
 
 
 def _plot_curve(axes: Axes, curve: FloatArray, color: str, shape: str) -> None:
@@ -186,10 +180,12 @@ def _label_ends(axes: Axes, ends: Sequence[_End]) -> None:
     # About 80 % of the figure's height are plot; a line of text takes 13 points of it.
     gap = 13 / (0.8 * 72 * axes.get_figure(root=True).get_figheight()) * (high - low)  # type: ignore[union-attr]
     for end, y in zip(ends, _apart(np.array([end.y for end in ends]), gap, low, high), strict=True):
+        italic, bold = "italic" in end.look, "bold" in end.look
         axes.annotate(
             end.text, (1, y), (6, 0), xycoords=axes.get_yaxis_transform(), textcoords="offset points",
             va="center", color=end.color, annotation_clip=False, parse_math=False,
-            fontstyle="italic" if end.italic else "normal", fontweight="bold",
+            fontstyle="italic" if italic else "normal", fontweight="bold" if bold else "normal",
+            fontsize=8 if end.look == "small" else 9.5,
         )  # fmt: skip
 
 

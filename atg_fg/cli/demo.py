@@ -35,6 +35,7 @@ def demo(
     novel: Annotated[bool, typer.Option("--novel", help="Present an object the robot has never met.")] = False,
     output: Annotated[Path, typer.Option(help="Folder for the pictures, the memory and the record.")] = Path("out"),
     seed: options.Seed = 0,
+    json_file: options.JsonFile = None,
 ) -> None:
     """Let the robot learn a small memory, then recognise an object from camera images, step by step.
 
@@ -42,10 +43,11 @@ def demo(
     """
     options.check_at_least(1, actions=actions)
     options.check_at_least(0, seed=seed)
+    options.check_json_option(json_file)
     parameters = preset_named(preset)
     figures.figure_class()  # fails now rather than at the end, if matplotlib is not installed
     folder = store.make_folder(output)
-    console = options.console()
+    console = options.console(json_file)
     learn_seed, trial_seed = np.random.SeedSequence(seed).spawn(2)
     memory = RobotMemory(arcube_assumptions())
     begin_trial(engine, memory, parameters)
@@ -67,10 +69,13 @@ def demo(
             on_step=story.tell,
         )
         story.verdict(record)
-        truth = "a new object" if novel else memory.names[presented]
-        console.print(f"truth:   {truth}")
+        truth = None if novel else record.names[presented]
+        console.print(f"truth:   {truth or 'a new object'}")
         _save(folder, made_world, record, memory)
-    console.print(f"saved:   {', '.join(str(path) for path in sorted(folder.iterdir()))}")
+    saved = [str(path) for path in sorted(folder.iterdir())]
+    console.print(f"saved:   {', '.join(saved)}")
+    document = {"command": "demo", "judged_novel": record.judged_novel, "matched": record.matched, "truth": truth}
+    options.write_json({**document, "saved": saved}, json_file)
 
 
 def _learn(world: World, memory: RobotMemory, rng: np.random.Generator) -> None:

@@ -56,13 +56,16 @@ def show(file: MemoryFile, json_file: options.JsonFile = None) -> None:
 
 
 @app.command()
-def check(file: MemoryFile) -> None:
+def check(file: MemoryFile, json_file: options.JsonFile = None) -> None:
     """Check a memory file; leave with status 2 and the first fault if it has one.
 
     Example: atg-fg memory check memory.json
     """
+    options.check_json_option(json_file)
     memory = store.load_memory(file)
-    typer.echo(f"{file}: sound, {len(memory)} ATGs")
+    options.write_json({"command": "memory check", "sound": True, "objects": len(memory)}, json_file)
+    if json_file != "-":
+        typer.echo(f"{file}: sound, {len(memory)} ATGs")
 
 
 @app.command()

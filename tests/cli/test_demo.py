@@ -1,3 +1,4 @@
+import json
 import os
 
 from atg_fg import store
@@ -21,9 +22,12 @@ def test_the_demo_recognises_an_object_from_camera_images(run, tmp_path):
 
 
 def test_the_demo_tells_a_new_object(run, tmp_path):
-    status, output, _ = run("demo", "--output", tmp_path, "--novel", "--world", "ideal", "--engine", "bayes-filter")
+    quick = ["--world", "ideal", "--engine", "bayes-filter", "--json", "-"]
+    status, output, story = run("demo", "--output", tmp_path, "--novel", *quick)
     assert status == 0
-    assert "verdict: a new object" in output
+    assert "verdict: a new object" in story
+    document = json.loads(output)
+    assert (document["judged_novel"], document["matched"], document["truth"]) == (True, None, None)
     assert "frame.png" not in os.listdir(tmp_path)
 
 

@@ -28,6 +28,7 @@ def test_show_lists_what_is_known_of_each_object(run, file):
 
 def test_check_says_that_a_memory_is_sound(run, file):
     assert run("memory", "check", file)[:2] == (0, f"{file}: sound, 1 ATGs\n")
+    assert json.loads(run("memory", "check", file, "--json", "-")[1])["sound"] is True
 
 
 def test_check_names_the_first_fault(refused, file):
