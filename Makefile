@@ -37,9 +37,8 @@ format: $(READY)  ## Mend style
 	$(BIN)/ruff check --fix .
 	$(BIN)/ruff format .
 
-notebooks: $(READY)  ## Execute the notebooks in place and bring their paired scripts in step
-	$(BIN)/jupytext --sync notebooks/*.py
-	$(BIN)/jupytext --execute notebooks/*.ipynb
+notebooks: $(READY)  ## Execute the notebooks, with the sources of their paired scripts
+	$(BIN)/python notebooks/execute.py
 
 bench: $(READY)  ## Time one decision of every engine, side by side
 	$(BIN)/python benchmarks/decision.py

@@ -13,7 +13,7 @@ import gymnasium
 import numpy as np
 from gymnasium import spaces
 
-from atg_fg.arcube import ACTION_SOURCES, N_TAGS, ORIENTATIONS, SUCCESSORS, Cube, make_arcubes, shown_pattern
+from atg_fg.arcube import ACTION_SOURCES, FACES, N_TAGS, ORIENTATIONS, SUCCESSORS, Cube, make_arcubes, shown_pattern
 from atg_fg.errors import InvalidInputError, unknown_name
 from atg_fg.patterns import Detection, IntArray
 
@@ -41,6 +41,8 @@ def make_world(name: str, **options: Any) -> World:
     try:
         return gymnasium.make(WORLDS.get(name, name), disable_env_checker=True, **options)
     except (gymnasium.error.Error, ModuleNotFoundError, TypeError) as error:
+        if isinstance(error, TypeError) and "unexpected keyword argument" not in str(error):
+            raise  # a fault of the world's own
         raise InvalidInputError(f"world {name!r}: cannot be made: {error}") from error
 
 
@@ -82,6 +84,9 @@ class ARcubeWorld(gymnasium.Env[IntArray, np.int64]):
         self.cubes = tuple(cubes) if cubes is not None else make_arcubes(100, seed=0)
         if not self.cubes:
             raise InvalidInputError("cubes: none given; expected at least one")
+        for cube in self.cubes:
+            if len(set(cube)) != len(FACES) or len(cube) != len(FACES) or not all(0 <= tag < N_TAGS for tag in cube):
+                raise InvalidInputError(f"cubes: {cube!r}; expected {len(FACES)} different tags from 0 to {N_TAGS - 1}")
         self.slip = probability_option("slip", slip)
         self.wrong = probability_option("wrong", wrong)
         self.missing = probability_option("missing", missing)

@@ -56,7 +56,9 @@ class Marker:
 @lru_cache(maxsize=1)
 def _detector() -> cv2.aruco.ArucoDetector:
     parameters = cv2.aruco.DetectorParameters()
-    parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_SUBPIX
+    # Lines fitted to a tag's sides: sub-pixel search strays on the foreshortened front (p95 of the cube's centre
+    # 14 mm, against 6 mm).
+    parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_CONTOUR
     return cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(TAG_DICTIONARY), parameters)
 
 

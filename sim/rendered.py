@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from collections.abc import Sequence
 from typing import Any, Final
 
@@ -21,6 +22,7 @@ from sim.detection import Marker, detect_markers, detected_symbols, draw_detecti
 #: Where the cube's centre stands when nothing is jittered, m.
 CUBE_CENTRE: Final = np.array([0.42, 0.0, 0.30])
 
+_MOST_PIXELS: Final = 2048
 _WOOD, _FLOOR = [0.66, 0.50, 0.34, 1.0], [0.80, 0.82, 0.84, 1.0]
 
 
@@ -70,10 +72,13 @@ class RenderedARcubeWorld(ARcubeWorld):
         self.light_jitter = _at_least_zero("light_jitter", light_jitter)
         self.image_noise = _at_least_zero("image_noise", image_noise)
         self.blur = _at_least_zero("blur", blur)
-        self.camera = Camera(image_size=image_size)
-        self.frame: NDArray[np.uint8] = np.zeros((image_size[1], image_size[0], 3), dtype=np.uint8)
+        width, height = _checked_size(image_size)
+        self.camera = Camera(image_size=(width, height))
+        self.frame: NDArray[np.uint8] = np.zeros((height, width, 3), dtype=np.uint8)
         self.markers: list[Marker] = []
         self._client = pybullet.connect(pybullet.DIRECT)
+        # A world that nobody closes must not keep its client until the process ends.
+        self._disconnect = weakref.finalize(self, pybullet.disconnect, physicsClientId=self._client)
         self._build_table()
         self._cube = CubeBody(self._client)
         self._offset = np.zeros(3)
@@ -87,9 +92,8 @@ class RenderedARcubeWorld(ARcubeWorld):
 
     def close(self) -> None:
         """Leave PyBullet; the world cannot be used any more."""
-        if self._client >= 0:
-            pybullet.disconnect(physicsClientId=self._client)
-            self._client = -1
+        self._disconnect()
+        self._client = -1
 
     def _build_table(self) -> None:
         half_sizes = ([0.32, 0.40, 0.02], _WOOD), ([4.0, 4.0, 0.01], _FLOOR)
@@ -102,8 +106,11 @@ class RenderedARcubeWorld(ARcubeWorld):
 
     def _place(self) -> None:
         """Put the cube down in its orientation, a little off as the jitter options say."""
-        self._offset = np.append(self.np_random.uniform(-1, 1, 2) * self.position_jitter, 0.0)
-        self._yaw = float(np.radians(self.np_random.uniform(-1, 1) * self.yaw_jitter))
+        # Nothing is drawn for what is off, so that the same seed slips here and in the ideal world alike.
+        if self.position_jitter:
+            self._offset = np.append(self.np_random.uniform(-1, 1, 2) * self.position_jitter, 0.0)
+        if self.yaw_jitter:
+            self._yaw = float(np.radians(self.np_random.uniform(-1, 1) * self.yaw_jitter))
         self._cube.show(self.cubes[self.object])
         self._cube.place(CUBE_CENTRE + self._offset, self.cube_rotation)
 
@@ -129,7 +136,7 @@ class RenderedARcubeWorld(ARcubeWorld):
     def _light(self) -> Light:
         if not self.light_jitter:
             return Light()
-        change = self.light_jitter * self.np_random.uniform(-1, 1, 4)
+        change = self.light_jitter * self.np_random.uniform(-1, 1, 3)
         x, y, z = Light().direction
         return Light((x + change[0], y + change[1], z), Light().ambient, Light().diffuse * (1 + 0.5 * change[2]))
 
@@ -144,3 +151,11 @@ def _at_least_zero(name: str, value: float) -> float:
     if not 0 <= value < np.inf:
         raise InvalidInputError(f"{name}: {value!r}; expected a finite number of at least 0")
     return float(value)
+
+
+def _checked_size(size: Sequence[int]) -> tuple[int, int]:
+    """Return (width, height), or raise ``InvalidInputError``."""
+    whole = isinstance(size, Sequence) and all(isinstance(pixels, (int, np.integer)) for pixels in size)
+    if not whole or len(size) != 2 or not all(16 <= pixels <= _MOST_PIXELS for pixels in size):
+        raise InvalidInputError(f"image_size: {size!r}; expected width and height, each 16 to {_MOST_PIXELS} pixels")
+    return int(size[0]), int(size[1])

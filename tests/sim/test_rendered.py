@@ -1,8 +1,10 @@
+import gc
 import hashlib
 import multiprocessing
 import resource
 
 import numpy as np
+import pybullet
 import pytest
 from gymnasium.utils.env_checker import check_env
 
@@ -159,3 +161,34 @@ def test_a_missing_package_is_named_with_the_extra_that_brings_it(monkeypatch, m
     monkeypatch.setattr(sim.importlib.util, "find_spec", lambda name: None if name == module else find(name))
     with pytest.raises(MissingDependencyError, match=rf"{package} is not installed.*atg-fg\[sim\]"):
         make_world("rendered")
+
+
+def test_the_same_seed_slips_here_and_in_the_ideal_world_alike(make):
+    world, ideal = make(slip=0.3, image_size=(64, 48)), make_world("ideal", slip=0.3)
+    for seed in (7, None):
+        truths = [world.reset(seed=seed)[1], ideal.reset(seed=seed)[1]]
+        for action in (0, 1, 2) * 5:
+            assert truths[0]["object"] == truths[1]["object"]
+            assert truths[0]["orientation"] == truths[1]["orientation"]
+            truths = [made.step(np.int64(action))[4] for made in (world, ideal)]
+
+
+@pytest.mark.parametrize("size", [(0, 0), (-1, 5), "big", (320.5, 240), (320,), None, (100_000, 100_000)])
+def test_an_image_size_that_is_none_is_refused(size):
+    with pytest.raises(InvalidInputError, match=r"image_size: .*; expected width and height"):
+        RenderedARcubeWorld(image_size=size)
+
+
+@pytest.mark.parametrize("cube", [(0, 1, 2, 3, 4, 12), (0, 1, 2, 3, 4, -1), (0, 1, 2)])
+def test_a_cube_without_a_tag_for_each_face_is_refused(cube):
+    with pytest.raises(InvalidInputError, match=r"cubes: .*; expected 6 different tags from 0 to 11"):
+        RenderedARcubeWorld([cube])
+
+
+def test_a_world_that_nobody_closes_leaves_pybullet():
+    world = RenderedARcubeWorld(image_size=(64, 48))
+    client = world._client
+    assert pybullet.isConnected(client)
+    del world
+    gc.collect()
+    assert not pybullet.isConnected(client)
