@@ -160,7 +160,7 @@ def _plot_expected(
         axes.plot(
             [t + 1 - shift for t in steps], [expected[t][action] for t in steps], shape, zorder=4,
             markersize=7 if taken else 5, markeredgecolor=color, markerfacecolor=color if taken else "white",
-            label=None if taken else f"expected of {action}",
+            label=None if taken else action,
         )  # fmt: skip
 
 

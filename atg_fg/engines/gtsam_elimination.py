@@ -76,13 +76,10 @@ class GtsamElimination(FilterInference):
         return predicted
 
     def _correct(self, aspects: FloatArray, likelihood: FloatArray) -> FloatArray:
-        """Multiply each object's prediction by its observation factor."""
-        joint = np.zeros_like(aspects)
-        for hypothesis, n_states in enumerate(self._n_states()):
-            predicted = factors.factor([_NOW], aspects[hypothesis, :n_states])
-            observation = factors.factor([_NOW], likelihood[hypothesis, :n_states])
-            joint[hypothesis, :n_states] = factors.vector(predicted * observation, n_states)
-        return joint
+        """Multiply the prediction by the observation factor; (O, X_t) is one variable, since neither is summed out."""
+        predicted = factors.factor([_NOW], aspects.ravel())
+        observation = factors.factor([_NOW], likelihood.ravel())
+        return factors.vector(predicted * observation, aspects.size).reshape(aspects.shape)
 
     def _n_states(self) -> list[int]:
         return [1 + int(n_known) for n_known in self.model.n_known]
