@@ -96,8 +96,9 @@ def replay(
     """
     begin_trial(engine, RobotMemory(arcube_assumptions()), preset_named("default"))
     scripts = [read_script(store.read_text_file(file), str(file)) for file in files]
-    for file, script in zip(files, scripts, strict=True):
-        document = replay_script(script, engine, smooth=smooth)
+    # All are run before any is printed: a step of probability zero in one of them must not leave half an answer.
+    documents = [replay_script(script, engine, smooth=smooth) for script in scripts]
+    for file, document in zip(files, documents, strict=True):
         if table:
             options.console().print(_replay_table(str(file), document))
         else:

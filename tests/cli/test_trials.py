@@ -50,6 +50,14 @@ def test_every_file_is_checked_before_the_first_is_run(refused, script, tmp_path
     assert "absent.json: cannot be read" in refused("replay", script, tmp_path / "absent.json")
 
 
+def test_evidence_of_probability_zero_leaves_no_half_answer(refused, script, tmp_path):
+    certain = {"transition_concentration": 0, "observation_noise": 0, "learn_in_trial": True}
+    looks = [{"observe": pattern} for pattern in ([0, 1], [2, 3], [0, 1], [4, 5])]
+    steps = [step for look in looks for step in (look, {"act": "flip"})]
+    (tmp_path / "odd.json").write_text(json.dumps({**SCRIPT, "parameters": certain, "steps": steps}))
+    assert "odd.json: steps[6]: the evidence has probability zero" in refused("replay", script, tmp_path / "odd.json")
+
+
 def test_an_engine_that_would_need_too_much_says_so(refused, tmp_path):
     steps = [{"observe": [0, 1]}, *[{"act": "flip"}, {"observe": [0, 1]}] * 40]
     (tmp_path / "long.json").write_text(json.dumps({**SCRIPT, "steps": steps}))
