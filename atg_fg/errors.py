@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+
 
 class AtgError(Exception):
     """Any error of this project that a user can cause and mend."""
@@ -27,7 +29,7 @@ class MissingDependencyError(AtgError, ImportError):
     """An optional package that is not installed; the message names the extra that brings it."""
 
 
-def unknown_name(kind: str, name: object, known: object) -> UnknownNameError:
+def unknown_name(kind: str, name: object, known: Iterable[object]) -> UnknownNameError:
     """Return the error for ``name`` missing from a registry, listing the names ``known`` there."""
-    names = ", ".join(sorted(map(str, known)))  # type: ignore[call-overload]
+    names = ", ".join(sorted(map(str, known)))
     return UnknownNameError(f"{kind}: unknown name {name!r}; expected one of: {names}")
