@@ -64,11 +64,13 @@ def factor(keys: Sequence[int], table: FloatArray) -> Factor:
         raise InvalidInputError(
             f"factor on ({names(keys)}): shape {table.shape}; expected one axis a variable, none empty"
         )
-    if not (table.min() >= 0 and table.max() < np.inf):  # false for NaN, too
+    values = table.ravel().tolist()
+    if not (min(values) >= 0 and sum(values) < np.inf):  # the sum of anything with a NaN is below nothing
         raise InvalidInputError(f"factor on ({names(keys)}): expected finite values of at least 0")
     if 1 in table.shape:
         table = np.pad(table, [(0, cardinality(size) - size) for size in table.shape])
-    return gtsam.DecisionTreeFactor(list(zip(keys, table.shape, strict=True)), table.ravel().tolist())
+        values = table.ravel().tolist()
+    return gtsam.DecisionTreeFactor(list(zip(keys, table.shape, strict=True)), values)
 
 
 def cardinality(n_states: int) -> int:
@@ -84,7 +86,7 @@ def ordering(keys: Iterable[int]) -> Ordering:
     return order
 
 
-def values(assignment: dict[int, int]) -> Any:
+def assigned(assignment: dict[int, int]) -> Any:
     """Return an assignment of states to keys."""
     result = gtsam.DiscreteValues()
     for key, state in assignment.items():

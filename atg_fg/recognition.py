@@ -100,7 +100,9 @@ class RecognitionGraph:
         """p(O | z_0:t, a_1:t) (eq. 1 and 2): the marginal of O, which elimination leaves for last."""
         net = self.eliminate()
         marginal = net.at(net.size() - 1)
-        weights = np.array([marginal(factors.values({object_key(): state})) for state in range(len(self.chain.prior))])
+        weights = np.array(
+            [marginal(factors.assigned({object_key(): state})) for state in range(len(self.chain.prior))]
+        )
         if not weights.all():
             weights = self._joint_by_object()[0]
         probabilities = weights / weights.sum()

@@ -39,8 +39,8 @@ def test_a_factor_gives_back_the_table_it_was_made_from(shape: tuple[int, int]) 
 def test_axes_belong_to_their_keys_in_whatever_order_they_are_given(order: tuple[int, int]) -> None:
     table = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]])
     factor = factors.factor(list(order), table if order == (OBJECT, X0) else table.T)
-    assert factor(factors.values({OBJECT: 1, X0: 0})) == 4
-    assert factor(factors.values({OBJECT: 0, X0: 2})) == 3
+    assert factor(factors.assigned({OBJECT: 1, X0: 0})) == 4
+    assert factor(factors.assigned({OBJECT: 0, X0: 2})) == 3
 
 
 @pytest.mark.parametrize("n_states", [1, 2, 7])
@@ -68,8 +68,8 @@ def test_the_added_state_of_a_one_state_variable_is_impossible() -> None:
     factor = factors.factor([X0], np.array([0.5]))
     assert factors.cardinality(1) == 2
     assert factors.cardinality(3) == 3
-    assert factor(factors.values({X0: 0})) == 0.5
-    assert factor(factors.values({X0: 1})) == 0
+    assert factor(factors.assigned({X0: 0})) == 0.5
+    assert factor(factors.assigned({X0: 1})) == 0
 
 
 def test_keys_have_the_names_of_the_paper() -> None:

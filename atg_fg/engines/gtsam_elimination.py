@@ -9,9 +9,10 @@ collection node, and an object does not tell apart the patterns that it does not
 
 from __future__ import annotations
 
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from atg_fg import factors
 from atg_fg.engines.base import FilterInference
@@ -20,25 +21,10 @@ from atg_fg.factors import HYPOTHETICAL_KEY, Factor
 from atg_fg.memory import RobotMemory
 from atg_fg.model import COLLECTION, RecognitionModel
 from atg_fg.parameters import ModelParameters
-from atg_fg.patterns import FloatArray, IntArray
+from atg_fg.patterns import FloatArray
 from atg_fg.recognition import RecognitionGraph
 
 _NOW, _NEXT = factors.aspect_key(0), factors.aspect_key(1)
-
-
-class Hypothetical(NamedTuple):
-    """The factor p(z | x, a) of one object for all hypothetical actions and observations.
-
-    The states of X_t are all aspects without counted edges together, then each of ``sources``. The states of Z are,
-    for each action, one of the unknown patterns and one of the known unreached ones, then that of each target.
-
-    Attributes:
-        factor: On X_t and Z, of 1 + S by 2 A + R states.
-        sources: The aspects with counted edges, shape [S].
-    """
-
-    factor: Factor
-    sources: IntArray
 
 
 class GtsamElimination(FilterInference):
@@ -49,7 +35,7 @@ class GtsamElimination(FilterInference):
 
     def __init__(self, memory: RobotMemory, parameters: ModelParameters) -> None:
         super().__init__(memory, parameters)
-        self._hypothetical: tuple[Targets, list[Hypothetical]] | None = None
+        self._hypothetical: tuple[Targets, list[Factor]] | None = None
 
     def graph(self) -> RecognitionGraph:
         """Return the whole factor graph of the trial so far, with O, X0 … Xt."""
@@ -64,13 +50,12 @@ class GtsamElimination(FilterInference):
         """Multiply each object's belief by its transition factor and sum X_t out."""
         model = self.model
         transition = model.transition(action)
-        counted = model.counted[action]
+        apart: NDArray[np.bool_] = model.counted[action]
         eliminated = factors.ordering([_NOW])
         predicted = np.zeros_like(aspects)
-        for hypothesis, n_states in enumerate(self._n_states()):
-            sources = np.flatnonzero(counted[hypothesis])
-            belief = factors.factor([_NOW], lumped(aspects[hypothesis], sources))
-            rows = transition[hypothesis, [COLLECTION, *sources], :n_states]
+        beliefs = lumped_beliefs(aspects, apart)
+        for hypothesis, (n_states, belief) in enumerate(zip(self._n_states(), beliefs, strict=True)):
+            rows = transition[hypothesis, [COLLECTION, *np.flatnonzero(apart[hypothesis])], :n_states]
             product = belief * factors.factor([_NOW, _NEXT], rows)
             predicted[hypothesis, :n_states] = factors.vector(product.sum(eliminated), n_states)
         return predicted
@@ -95,8 +80,8 @@ class GtsamElimination(FilterInference):
         unknown = np.empty((model.n_actions, model.n_hypotheses))
         unreached = np.empty_like(unknown)
         reached: list[FloatArray] = []
-        for hypothesis, (factor, sources) in enumerate(hypotheticals):
-            belief = factors.factor([_NOW], lumped(mass[hypothesis], sources))
+        beliefs = lumped_beliefs(mass, np.any(model.counted, axis=0))
+        for hypothesis, (belief, factor) in enumerate(zip(beliefs, hypotheticals, strict=True)):
             n_kinds = factor.cardinality(HYPOTHETICAL_KEY)
             joint = factors.vector((belief * factor).sum(eliminated), n_kinds)
             unknown[:, hypothesis], unreached[:, hypothesis] = joint[: 2 * model.n_actions].reshape(2, -1)
@@ -105,16 +90,27 @@ class GtsamElimination(FilterInference):
         return expected_entropies(model, pattern_joint, float(mass[-1].sum()))
 
 
-def lumped(mass: FloatArray, sources: IntArray) -> FloatArray:
-    """Return the mass of all states but ``sources`` together, then that of each of ``sources``."""
-    others = np.ones(len(mass), dtype=bool)
-    others[sources] = False
+def lumped_beliefs(mass: FloatArray, apart: NDArray[np.bool_]) -> list[Factor]:
+    """Return each object's belief as a factor on X_t, with all states but those ``apart`` as one.
+
+    Args:
+        mass: Belief, shape [H, W].
+        apart: Which states stay apart, shape [H, W]; never the collection node, which is the first of the others.
+    """
     # A sum of the others, not a difference of sums: what is left may be tiny and must stay exact.
-    return np.concatenate(([mass[others].sum()], mass[sources]))
+    others = np.where(apart, 0.0, mass).sum(axis=1)
+    return [
+        factors.factor([_NOW], np.append(rest, own[kept])) for rest, own, kept in zip(others, mass, apart, strict=True)
+    ]
 
 
-def hypothetical_factors(model: RecognitionModel) -> tuple[Targets, list[Hypothetical]]:
-    """Return the targets of counted edges, by hypothesis, and the hypothetical factor of each hypothesis."""
+def hypothetical_factors(model: RecognitionModel) -> tuple[Targets, list[Factor]]:
+    """Return the targets of counted edges, by hypothesis, and the factor p(z | x, a) of each hypothesis.
+
+    It is for all hypothetical actions and observations at once. The states of X_t are all aspects without counted edges
+    together, then each of the others. The states of Z are, for each action, one of the unknown patterns and one of
+    the known unreached ones, then that of each target.
+    """
     edges, n_actions = model.edges, model.n_actions
     leads_to = np.zeros((model.n_hypotheses, n_actions, model.n_states), dtype=bool)
     leads_to[edges.hypothesis, edges.action, edges.target] = True
@@ -140,5 +136,5 @@ def hypothetical_factors(model: RecognitionModel) -> tuple[Targets, list[Hypothe
         row = np.searchsorted(rows, source)
         np.add.at(reached, (column, row), observed * model.edge_probability[own_edges])
         table = np.concatenate((unknown[:, hypothesis, rows], unreached[:, hypothesis, rows], reached)).T
-        hypotheticals.append(Hypothetical(factors.factor([_NOW, HYPOTHETICAL_KEY], table), sources))
+        hypotheticals.append(factors.factor([_NOW, HYPOTHETICAL_KEY], table))
     return Targets(action_of, hypothesis_of, state_of), hypotheticals
