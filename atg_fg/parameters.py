@@ -46,7 +46,7 @@ def _is_finite_number(value: object) -> bool:
         return False
 
 
-#: ``paper`` is the noise-free limit in which the printed Table 1 comes out; ``default`` also learns within the trial.
+#: ``paper`` takes the paper at its word, and assumes next to no noise; ``default`` also learns within the trial.
 PRESETS: Final[dict[str, ModelParameters]] = {
     "paper": ModelParameters(1e-8, 1e-8, learn_in_trial=False),
     "default": ModelParameters(1e-8, 1e-8, learn_in_trial=True),

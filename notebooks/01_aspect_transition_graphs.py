@@ -21,8 +21,8 @@
 # was observed after action $a$ in aspect $x$, and how often. So an ATG is a model of an object in terms of what the
 # robot can do to it and see of it, and it is learned by acting.
 #
-# This notebook shows the objects of the paper's experiments, learns ATGs of a few of them, draws one as in the paper's
-# Figure 1, and shows how it grows with exploration. Every random number comes from seeds 0, 1, 2, ….
+# This notebook shows the objects of the paper's experiments, learns the ATG of one of them, draws it as in the paper's
+# Figure 1, and shows how ATGs grow with exploration. Every random number comes from seeds 0, 1, 2, ….
 
 # %%
 import tempfile
@@ -121,9 +121,9 @@ graph
 # %% [markdown]
 # ## The ATG, drawn as in Figure 1 of the paper
 #
-# Each box is a known aspect with its two tags. A solid edge is a transition that was observed. All aspects that were
-# not are one *collection node*, of size $|G| - n$ when $n$ aspects are known; a dotted edge is an action not yet tried
-# in an aspect, and it may lead anywhere: to the collection node, or to an aspect that is known already.
+# Each cube is a known aspect with its two tags. A solid edge is a transition that was observed. All aspects that were
+# not are one *collection node*, of size $|G| - n$ when $n$ aspects are known. A dotted edge is an action not yet tried
+# in an aspect; it is drawn to the collection node, but may lead to an aspect that is known already, too.
 
 # %%
 draw_atg(graph, symbol_images={symbol: tag_image(symbol) for symbol in range(12)})
@@ -178,7 +178,7 @@ with plot_style():
         axes.axhline(total, color=GREY, linewidth=1, linestyle=":")
         axes.fill_between(range(N_ACTIONS + 1), y - dy, y + dy, color=color, alpha=0.2, linewidth=0)
         axes.plot(y, color=color)
-        axes.text(N_ACTIONS, y[-1] - 2, label, color=color, ha="right", va="top", fontweight="bold")
+        axes.text(75, y[75] - 3, label, color=color, va="top", fontweight="bold")
         axes.text(0, total + 0.8, f"all {total}", color=GREY, fontsize=8)
     axes.set(xlabel="actions taken", ylabel="known", xlim=(0, N_ACTIONS), ylim=(0, 78))
     axes.set_title(f"What is known of a cube ({N_RUNS} cubes, mean and 95 % interval)")

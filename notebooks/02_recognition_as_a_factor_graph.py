@@ -84,7 +84,7 @@ for number, step in enumerate(record.steps):
 # %% [markdown]
 # ## Its factor graph
 #
-# Above $O$'s right: its prior. Above $X_0$: $p(X_0 \mid O)$. Between two aspects: the action. Below each aspect: what
+# To the right of $O$: its prior. Above $X_0$: $p(X_0 \mid O)$. Between two aspects: the action. Below each aspect: what
 # was seen. Every factor has $O$ among its variables, since the memory holds a different ATG for each object.
 
 # %%
@@ -100,7 +100,8 @@ for index in range(graph.graph.size()):
 #
 # Three independent ways to $p(O \mid z_{0:5}, a_{1:5})$: eliminating the whole graph with GTSAM; the recursive Bayes
 # filter; and enumerating all $4 \cdot 10^6$ joint states of $(O, X_0, \dots, X_5)$, which is possible only since the
-# memory is small and the trial is short. GTSAM's own `DiscreteMarginals` is a fourth.
+# memory is small and the trial is short. Beside them, GTSAM's own `DiscreteMarginals`, and the engine that eliminates
+# step by step with GTSAM.
 
 
 # %%
@@ -190,6 +191,11 @@ for s in range(6):
     print(f"p(X{s} = truth): filtered {filtered[s, true_states[s]]:.3f}, smoothed {smoothed[s, true_states[s]]:.3f}")
 
 # %% [markdown]
+# Smoothing mends the wrong look: with the look after it, $X_4$ is clear. It also puts $X_2$ in doubt again, rightly so
+# given the evidence: the same pattern before and after a flip means that the action failed, or that look 2 was wrong
+# and the cube had stood as (4, 0), from where a flip is known to lead to (0, 5).
+
+# %% [markdown]
 # ## Expected entropy: a hypothetical action and observation, added as factors
 #
 # For eq. 3 one more action and one more observation are *added* to the graph. This is the graph of one hypothesis,
@@ -209,7 +215,8 @@ hypothetical
 # Averaged over all 132 patterns by their predictive probability, this is the expected entropy of one action. The engine
 # gets the same numbers without making $3 \cdot 132$ graphs: given $O$, the patterns that an object does not know have
 # one probability in common, as have the known ones that no counted edge leads to, so it eliminates one small factor for
-# each object. Both are measured here, side by side, on this small memory.
+# each object. It also goes on from the belief about $X_t$, where each of the graphs is eliminated from the first look.
+# Both are measured here, side by side, on this small memory.
 
 # %%
 started = time.perf_counter()
