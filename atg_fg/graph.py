@@ -180,7 +180,7 @@ class AspectTransitionGraph:
             other._counts,
         )
 
-    __hash__ = None  # type: ignore[assignment]  # graphs grow, so they are no keys
+    __hash__ = None  # type: ignore[assignment]  # mypy's usual complaint; graphs grow, so they are no keys
 
     def __repr__(self) -> str:
         return (

@@ -79,6 +79,13 @@ class Inference(ABC):
         """Return the trial so far as plain arrays, for all hypotheses or under one of them."""
         return build_chain(self.memory, self.parameters, self.history, None if hypothesis is None else [hypothesis])
 
+    def _impossible(self) -> ImpossibleEvidenceError:
+        """Return the error for a look, the one about to be taken in, that no hypothesis allows."""
+        return ImpossibleEvidenceError(
+            f"observation {len(self.history.evidence)}: the evidence has probability zero under the model; "
+            "expected evidence that some object could give, or noise above 0"
+        )
+
     @abstractmethod
     def identity(self) -> IdentityBelief:
         """Return p(O | z_0:t, a_1:t) (eq. 1 and 2)."""
@@ -86,7 +93,7 @@ class Inference(ABC):
     @property
     @abstractmethod
     def log_evidence(self) -> float:
-        """Ln p(z_0:t | a_1:t)."""
+        """Return ln p(z_0:t | a_1:t)."""
 
     def smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
         """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s, each of shape [W_s].
@@ -156,7 +163,7 @@ class FilterInference(Inference):
 
     @property
     def log_evidence(self) -> float:
-        """Ln p(z_0:t | a_1:t)."""
+        """Return ln p(z_0:t | a_1:t)."""
         return self._log_evidence
 
     @property
@@ -173,10 +180,7 @@ class FilterInference(Inference):
         )
         peak = log_joint.max()
         if not np.isfinite(peak):
-            raise ImpossibleEvidenceError(
-                f"observation {len(self.history.evidence)}: the evidence has probability zero under the model; "
-                "expected evidence that some object could give, or noise above 0"
-            )
+            raise self._impossible()
         log_probability = float(peak + np.log(np.exp(log_joint - peak).sum()))
         # A hypothesis that is ruled out keeps its prediction; its weight is zero from here on.
         divisor = np.where(possible, given_object, 1.0)[:, None]

@@ -8,7 +8,7 @@ import numpy as np
 
 from atg_fg.belief import IdentityBelief
 from atg_fg.engines.base import Inference
-from atg_fg.errors import ImpossibleEvidenceError, TooLargeError
+from atg_fg.errors import TooLargeError
 from atg_fg.memory import RobotMemory
 from atg_fg.model import Revelation
 from atg_fg.parameters import ModelParameters
@@ -41,7 +41,7 @@ class Enumeration(Inference):
 
     @property
     def log_evidence(self) -> float:
-        """Ln p(z_0:t | a_1:t)."""
+        """Return ln p(z_0:t | a_1:t)."""
         return self._log_scale
 
     def _smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
@@ -58,10 +58,7 @@ class Enumeration(Inference):
         weights = self._times_last(self.weights, likelihood)
         total = weights.sum()
         if not total > 0:
-            raise ImpossibleEvidenceError(
-                f"observation {len(self.history.evidence)}: the evidence has probability zero under the model; "
-                "expected evidence that some object could give, or noise above 0"
-            )
+            raise self._impossible()
         self.weights = weights / total
         self._log_scale += float(np.log(total))
 
