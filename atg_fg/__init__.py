@@ -9,9 +9,10 @@ from atg_fg.errors import AtgError
 from atg_fg.experiments import TestPlan, TestResult, run_test, run_tests, summarise
 from atg_fg.graph import AspectTransitionGraph
 from atg_fg.memory import RobotMemory
-from atg_fg.parameters import PRESETS, ModelParameters, preset
+from atg_fg.parameters import ModelParameters
 from atg_fg.patterns import Evidence, PatternAlphabet
 from atg_fg.policies import POLICIES, make_policy
+from atg_fg.presets import PRESETS, preset
 from atg_fg.recognition import RecognitionGraph
 from atg_fg.store import load_memory, save_memory
 from atg_fg.trial import TrialRecord, run_trial

@@ -6,7 +6,9 @@ import multiprocessing
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import closing
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
+from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,7 +21,9 @@ from atg_fg.memory import RobotMemory
 from atg_fg.parameters import ModelParameters
 from atg_fg.policies import make_policy
 from atg_fg.statistics import mean, standard_error, wilson_interval
+from atg_fg.store import make_folder
 from atg_fg.trial import TrialRecord, run_trial
+from atg_fg.trial_log import TrialLog, TrialOutcome
 from atg_fg.worlds import WORLDS, World, make_world
 
 
@@ -73,6 +77,8 @@ class TestResult:
         recognition: (of these matched to an ATG made from the object, trials in which an object met before was
             judged known).
         success: (trials right in both, trials).
+        lost: Trials that ended because the world lost the object.
+        undecided: Trials in which nothing at all was seen.
     """
 
     __test__ = False
@@ -81,9 +87,17 @@ class TestResult:
     identification: tuple[int, int]
     recognition: tuple[int, int]
     success: tuple[int, int]
+    lost: int = 0
+    undecided: int = 0
 
 
-def run_test(plan: TestPlan, seed: int, on_trial: Callable[[int, TrialRecord], None] | None = None) -> TestResult:
+def run_test(
+    plan: TestPlan,
+    seed: int,
+    records: Path | None = None,
+    resume: bool = False,
+    on_trial: Callable[[int, TrialRecord], None] | None = None,
+) -> TestResult:
     """Run a test from an empty memory and score it.
 
     Each trial has one generator, spawned from ``SeedSequence(seed)``; the first child draws the cubes.
@@ -91,71 +105,111 @@ def run_test(plan: TestPlan, seed: int, on_trial: Callable[[int, TrialRecord], N
     Args:
         plan: World, engine, policy and sizes.
         seed: Seed of the test.
-        on_trial: Called with the number and the record of each trial.
+        records: Folder in which every trial is saved as it ends.
+        resume: Go on after the trials that are already there; the result is the same as of a test in one go.
+        on_trial: Called with the number and the record of each trial that is run.
+
+    Raises:
+        InvalidInputError: The records are of another test, or already there while ``resume`` is false.
     """
     cubes_seed, *trial_seeds = np.random.SeedSequence(seed).spawn(1 + plan.n_trials)
     memory = RobotMemory(arcube_assumptions(plan.n_objects))
-    policy = make_policy(plan.policy)
+    log = _open_log(plan, seed, records, memory)
     score = _Score()
+    if log is not None:
+        for outcome in log.resume() if resume else log.begin():
+            score.add(outcome, learn_from(outcome, memory))
+    policy = make_policy(plan.policy)
     with closing(plan.make_world(int(cubes_seed.generate_state(1)[0]))) as world:
-        for number, trial_seed in enumerate(trial_seeds):
+        for number in range(score.n_trials, plan.n_trials):
             inference = begin_trial(plan.engine, memory, plan.parameters)
-            record = run_trial(world, inference, policy, plan.n_actions, np.random.default_rng(trial_seed))
-            score.add(record, learn_from(record, memory))
+            rng = np.random.default_rng(trial_seeds[number])
+            record = run_trial(world, inference, policy, plan.n_actions, rng)
+            outcome = TrialOutcome.of(record)
+            score.add(outcome, learn_from(outcome, memory))
+            if log is not None:
+                log.append(record)
             if on_trial is not None:
                 on_trial(number, record)
-    return TestResult(
-        seed,
-        (score.identified, plan.n_trials),
-        (score.recognised, score.judged_known),
-        (score.successes, plan.n_trials),
-    )
+    return score.result(seed)
 
 
-def learn_from(record: TrialRecord, memory: RobotMemory) -> str | None:
-    """Let the memory learn from a trial; return the name of the ATG, or ``None`` if no pattern was seen whole."""
-    if all(pattern is None for pattern in record.patterns):
+def _open_log(plan: TestPlan, seed: int, records: Path | None, memory: RobotMemory) -> TrialLog | None:
+    if records is None:
         return None
-    return memory.learn(record.patterns, record.actions, record.matched)
+    make_folder(records)
+    header = {"seed": seed, **asdict(plan)}
+    return TrialLog(records / f"test-{seed:04}.jsonl.gz", header, memory.assumptions)
+
+
+def learn_from(record: TrialRecord | TrialOutcome, memory: RobotMemory) -> str | None:
+    """Let the memory learn from a trial; return the name of the ATG.
+
+    Nothing is learned, and ``None`` returned, if the object was lost or no pattern was seen whole.
+    """
+    if record.verdict in ("lost", "undecided") or all(pattern is None for pattern in record.patterns):
+        return None
+    return memory.learn(list(record.patterns), list(record.actions), record.matched)
 
 
 class _Score:
     """Counts what is right over the trials of one test, by the truth rather than by the memory."""
 
     def __init__(self) -> None:
-        self.identified = self.recognised = self.judged_known = self.successes = 0
+        self.n_trials = self.identified = self.recognised = self.judged_known = self.successes = 0
+        self.lost = self.undecided = 0
         self._presented: set[object] = set()
         self._made_from: dict[str, object] = {}
 
-    def add(self, record: TrialRecord, learned: str | None) -> None:
-        """Score a trial whose record went to the ATG named ``learned``."""
-        truth = record.steps[0].truth["object"]
-        seen_before = truth in self._presented
-        identified = record.judged_novel != seen_before
-        right_match = record.matched is not None and self._made_from.get(record.matched) == truth
+    def add(self, outcome: TrialOutcome, learned: str | None) -> None:
+        """Score a trial whose record went to the ATG named ``learned``.
+
+        A trial without a verdict is no success. An object of which nothing was learned counts as not met.
+        """
+        self.n_trials += 1
+        self.lost += outcome.verdict == "lost"
+        self.undecided += outcome.verdict == "undecided"
+        seen_before = outcome.object in self._presented
+        identified = outcome.verdict == ("known" if seen_before else "novel")
+        right_match = outcome.matched is not None and self._made_from.get(outcome.matched) == outcome.object
         self.identified += identified
         self.judged_known += seen_before and identified
         self.recognised += seen_before and identified and right_match
         self.successes += identified and (right_match or not seen_before)
-        self._presented.add(truth)
-        if record.judged_novel and learned is not None:
-            self._made_from[learned] = truth
+        if learned is not None:
+            self._presented.add(outcome.object)
+            if outcome.verdict == "novel":
+                self._made_from[learned] = outcome.object
+
+    def result(self, seed: int) -> TestResult:
+        """Return the scores of the test with this seed."""
+        return TestResult(
+            seed,
+            (self.identified, self.n_trials),
+            (self.recognised, self.judged_known),
+            (self.successes, self.n_trials),
+            self.lost,
+            self.undecided,
+        )
 
 
-def run_tests(plans: Sequence[tuple[TestPlan, int]], jobs: int = 1) -> Iterator[TestResult]:
+def run_tests(
+    plans: Sequence[tuple[TestPlan, int]], jobs: int = 1, records: Path | None = None, resume: bool = False
+) -> Iterator[TestResult]:
     """Run each (plan, seed), in ``jobs`` processes, and yield the results in the order of ``plans``.
 
-    The results are the same for any number of jobs.
+    The results are the same for any number of jobs. ``records`` and ``resume`` are as for ``run_test``.
     """
     if jobs < 1:
         raise InvalidInputError(f"jobs: {jobs}; expected a whole number of at least 1")
+    run = partial(run_test, records=records, resume=resume)
     if jobs == 1:
-        yield from (run_test(plan, seed) for plan, seed in plans)
+        yield from (run(plan, seed) for plan, seed in plans)
         return
     # Spawned workers share no state with this process, so they cannot inherit half of a library's.
     context = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(min(jobs, len(plans)), mp_context=context) as executor:
-        yield from executor.map(run_test, *zip(*plans, strict=True))
+        yield from executor.map(run, *zip(*plans, strict=True))
 
 
 def summarise(results: Iterable[TestResult]) -> dict[str, Any]:
@@ -175,12 +229,16 @@ def summarise(results: Iterable[TestResult]) -> dict[str, Any]:
                 "identification": list(test.identification),
                 "recognition": list(test.recognition),
                 "success": test.success[0] / test.success[1],
+                "lost": test.lost,
+                "undecided": test.undecided,
             }
             for test in tests
         ],
         "average": {name: mean(values) for name, values in rates.items()},
         "standard_error": {name: standard_error(values) for name, values in rates.items()},
         "interval95": {name: list(pooled_interval(tests, name)) for name in rates},
+        "lost": sum(test.lost for test in tests),
+        "undecided": sum(test.undecided for test in tests),
     }
 
 

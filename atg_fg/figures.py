@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import functools
 import io
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final
@@ -61,6 +61,8 @@ _STYLE: Final[Any] = {
     "text.usetex": False,
 }
 
+_FILM_COLOURS: Final = 64
+
 #: Metadata that would differ from run to run, by file format.
 _UNDATED: Final[dict[str, dict[str, Any]]] = {
     "png": {"Software": None},
@@ -97,6 +99,28 @@ def save_image(image: NDArray[np.uint8], path: Path | str) -> None:
 
     buffer = io.BytesIO()
     matplotlib_image.imsave(buffer, image, format="png", cmap="gray", vmin=0, vmax=255, metadata=_UNDATED["png"])
+    store.write_bytes_atomically(path, buffer.getvalue())
+
+
+def save_film(pictures: Sequence[NDArray[np.uint8]], fps: int, path: Path | str) -> None:
+    """Write RGB pictures, each of shape [height, width, 3], as an animated GIF of ``fps`` pictures a second.
+
+    Raises:
+        InvalidInputError: No pictures, another suffix than .gif, or a place that cannot be written.
+        MissingDependencyError: Pillow, which comes with matplotlib, is not installed.
+    """
+    figure_class()
+    from PIL import Image
+
+    if not pictures or Path(path).suffix.lower() != ".gif":
+        raise InvalidInputError(f"film {str(path)!r}: {len(pictures)} pictures; expected some, and the suffix .gif")
+    store.check_writable(path)
+    # One palette for all pictures, from a few of them, so that what does not move does not flicker.
+    sample = np.concatenate(pictures[:: max(1, len(pictures) // 6)])
+    palette = Image.fromarray(sample).quantize(_FILM_COLOURS)
+    frames = [Image.fromarray(picture).quantize(palette=palette, dither=Image.Dither.NONE) for picture in pictures]
+    buffer = io.BytesIO()
+    frames[0].save(buffer, "gif", save_all=True, append_images=frames[1:], duration=1000 // fps, loop=0)
     store.write_bytes_atomically(path, buffer.getvalue())
 
 

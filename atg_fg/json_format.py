@@ -10,6 +10,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, NoReturn
 
+import numpy as np
+
 from atg_fg.assumptions import Assumptions
 from atg_fg.errors import InvalidInputError
 from atg_fg.graph import AspectTransitionGraph
@@ -27,6 +29,13 @@ def parse_json(text: str, place: str) -> Any:
         return json.loads(text, parse_constant=_refuse_constant, object_pairs_hook=_unique_keys)
     except (ValueError, RecursionError) as error:
         raise InvalidInputError(f"{place}: not valid JSON: {error}") from error
+
+
+def plain_json(value: Any) -> Any:
+    """Return a NumPy value as JSON knows it; what ``json.dumps`` asks for what it does not know itself."""
+    if isinstance(value, (np.ndarray, np.generic)):
+        return value.tolist()
+    raise TypeError(f"a record cannot hold a {type(value).__name__}")
 
 
 def _refuse_constant(name: str) -> NoReturn:

@@ -1,12 +1,11 @@
-"""Parameters of the recognition model, and the presets that name useful sets of them."""
+"""Parameters of the recognition model."""
 
 from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import Final
 
-from atg_fg.errors import InvalidInputError, unknown_name
+from atg_fg.errors import InvalidInputError
 
 
 @dataclass(frozen=True)
@@ -44,17 +43,3 @@ def _is_finite_number(value: object) -> bool:
         return math.isfinite(value)
     except OverflowError:  # a whole number too large for a float
         return False
-
-
-#: ``paper`` takes the paper at its word, and assumes next to no noise; ``default`` also learns within the trial.
-PRESETS: Final[dict[str, ModelParameters]] = {
-    "paper": ModelParameters(1e-8, 1e-8, learn_in_trial=False),
-    "default": ModelParameters(1e-8, 1e-8, learn_in_trial=True),
-}
-
-
-def preset(name: str) -> ModelParameters:
-    """Return the parameters named ``name``, or raise ``UnknownNameError``."""
-    if name not in PRESETS:
-        raise unknown_name("preset", name, PRESETS)
-    return PRESETS[name]

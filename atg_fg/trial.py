@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
@@ -13,9 +13,13 @@ from atg_fg.assumptions import Assumptions
 from atg_fg.belief import IdentityBelief
 from atg_fg.engines.base import Inference
 from atg_fg.errors import InvalidInputError
+from atg_fg.json_format import plain_json
 from atg_fg.patterns import Detection, Evidence, FloatArray
 from atg_fg.policies import Policy
 from atg_fg.worlds import World, detection_of
+
+#: How a trial can end.
+Verdict: TypeAlias = Literal["novel", "known", "lost", "undecided"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,12 +52,14 @@ class TrialRecord:
     Attributes:
         names: Names of the remembered objects, in the order of their index.
         assumptions: What the trial took for granted.
-        steps: The looks, t + 1 of them for t actions.
+        steps: The looks, t + 1 of them for t actions; one less if the object was lost.
+        lost_truth: What the world's ``info`` said when it lost the object, ``None`` if it did not.
     """
 
     names: tuple[str, ...]
     assumptions: Assumptions
     steps: list[TrialStep] = field(default_factory=list)
+    lost_truth: dict[str, Any] | None = None
 
     @property
     def belief(self) -> IdentityBelief:
@@ -61,15 +67,24 @@ class TrialRecord:
         return self.steps[-1].belief
 
     @property
+    def verdict(self) -> Verdict:
+        """How the trial ended: ``undecided`` if nothing at all was seen, ``lost`` if the world lost the object."""
+        if self.lost_truth is not None:
+            return "lost"
+        if all(symbol is None for step in self.steps for symbol in step.detection):
+            return "undecided"
+        return "novel" if self.belief.is_novel else "known"
+
+    @property
     def judged_novel(self) -> bool:
         """Whether the object is judged novel at the end."""
-        return self.belief.is_novel
+        return self.verdict == "novel"
 
     @property
     def matched(self) -> str | None:
-        """Name of the ATG the object is matched to, ``None`` if it is judged novel."""
+        """Name of the ATG the object is matched to, ``None`` if it is not judged known."""
         best = self.belief.most_probable_object
-        return None if self.judged_novel or best is None else self.names[best]
+        return self.names[best] if self.verdict == "known" and best is not None else None
 
     @property
     def patterns(self) -> list[int | None]:
@@ -85,9 +100,9 @@ class TrialRecord:
         """Return the record as JSON lines: a header, a line a step, the verdict."""
         lines: list[dict[str, Any]] = [{"format": "atg-fg/trial", "version": 1, "objects": self.names, **header}]
         lines += [self._step_line(time) for time in range(len(self.steps))]
-        verdict = {"judged_novel": self.judged_novel, "matched": self.matched, "truth": self.steps[-1].truth}
-        lines.append({"verdict": verdict})
-        return "".join(json.dumps(line, default=_plain, allow_nan=False) + "\n" for line in lines)
+        verdict = {"outcome": self.verdict, "judged_novel": self.judged_novel, "matched": self.matched}
+        lines.append({"verdict": {**verdict, "truth": self.lost_truth or self.steps[-1].truth}})
+        return "".join(json.dumps(line, default=plain_json, allow_nan=False) + "\n" for line in lines)
 
     def _step_line(self, time: int) -> dict[str, Any]:
         step, actions = self.steps[time], self.assumptions.actions
@@ -103,13 +118,6 @@ class TrialRecord:
             "action": None if step.action is None else actions[step.action],
             "truth": step.truth,
         }
-
-
-def _plain(value: Any) -> Any:
-    """Return NumPy values as JSON knows them."""
-    if isinstance(value, (np.ndarray, np.generic)):
-        return value.tolist()
-    raise TypeError(f"a record cannot hold a {type(value).__name__}")
 
 
 def check_world(world: World, assumptions: Assumptions) -> None:
@@ -138,6 +146,9 @@ def run_trial(
 ) -> TrialRecord:
     """Look and act ``n_actions`` times, look once more, and return the record.
 
+    A world that ends the episode ends the trial, with a last look at what it shows; one whose ``info`` says that the
+    object is ``lost`` ends it without.
+
     Args:
         world: A world whose spaces fit the memory's assumptions.
         inference: An engine at the beginning of a trial.
@@ -153,7 +164,8 @@ def run_trial(
     check_world(world, assumptions)
     record = TrialRecord(inference.memory.names, assumptions)
     observation, truth = world.reset(seed=int(rng.integers(2**31)), options=reset_options)
-    for remaining in range(n_actions, -1, -1):
+    remaining = n_actions
+    while True:
         detection = detection_of(observation)
         evidence = Evidence.of_detection(assumptions.alphabet, detection)
         inference.observe(evidence)
@@ -170,7 +182,11 @@ def run_trial(
         record.steps.append(step)
         if on_step is not None:
             on_step(step)
-        if choice is not None:
-            inference.act(choice.action)
-            observation, _, _, _, truth = world.step(np.int64(choice.action))
-    return record
+        if choice is None:
+            return record
+        inference.act(choice.action)
+        observation, _, terminated, truncated, truth = world.step(np.int64(choice.action))
+        if truth.get("lost"):
+            record.lost_truth = truth
+            return record
+        remaining = 0 if terminated or truncated else remaining - 1

@@ -26,6 +26,7 @@ World: TypeAlias = gymnasium.Env[IntArray, np.int64]
 WORLDS: Final[dict[str, str]] = {
     "ideal": "atg_fg:atg_fg/ARcube-v0",
     "rendered": "sim:sim/RenderedARcube-v0",
+    "robonaut": "sim:sim/RobonautARcube-v0",
 }
 
 

@@ -21,9 +21,9 @@ from atg_fg.engines import begin_trial
 from atg_fg.engines.base import Inference
 from atg_fg.engines.gtsam_elimination import GtsamElimination
 from atg_fg.memory import RobotMemory
-from atg_fg.parameters import preset
 from atg_fg.patterns import Evidence
 from atg_fg.policies import RandomPolicy
+from atg_fg.presets import preset
 from atg_fg.trial import run_trial
 from atg_fg.worlds import detection_of, make_world
 

@@ -38,8 +38,8 @@ from atg_fg.experiments import learn_from
 from atg_fg.figures import GREY, PALETTE, figure_class, plot_style
 from atg_fg.graph import COLLECTION_NODE, AspectTransitionGraph
 from atg_fg.memory import RobotMemory
-from atg_fg.parameters import preset
 from atg_fg.policies import make_policy
+from atg_fg.presets import preset
 from atg_fg.store import load_memory, memory_to_json, save_memory
 from atg_fg.trial import TrialRecord, run_trial
 from atg_fg.worlds import World, make_world

@@ -35,9 +35,10 @@ from atg_fg.experiments import TestPlan, TestResult, figure3_points, pooled_inte
 from atg_fg.figures import GREY, PALETTE, figure_class, plot_style
 from atg_fg.graph import AspectTransitionGraph
 from atg_fg.memory import RobotMemory
-from atg_fg.parameters import ModelParameters, preset
+from atg_fg.parameters import ModelParameters
 from atg_fg.patterns import Evidence
 from atg_fg.plots import plot_success
+from atg_fg.presets import preset
 from atg_fg.trial import TrialRecord
 
 # %% [markdown]

@@ -1,4 +1,4 @@
-"""The ARcube in simulation: PyBullet renders it, OpenCV ArUco detection supplies the evidence.
+"""The ARcube in simulation: a robot turns it in PyBullet, OpenCV ArUco detection supplies the evidence.
 
 Importing this package registers its worlds with gymnasium; PyBullet and OpenCV are imported when one is made.
 """
@@ -31,13 +31,20 @@ def require_simulator() -> None:
 def make_rendered_arcube(**options: Any) -> gymnasium.Env[Any, Any]:
     """Return a ``sim.rendered.RenderedARcubeWorld``; its module is imported only now."""
     require_simulator()
-    _import_quietly("pybullet")
+    import_quietly("pybullet")
     from sim.rendered import RenderedARcubeWorld
 
     return RenderedARcubeWorld(**options)
 
 
-def _import_quietly(module: str) -> None:
+def make_robonaut_arcube(**options: Any) -> gymnasium.Env[Any, Any]:
+    """Return a ``sim.robot.world.RobonautARcubeWorld``; its module is imported only now."""
+    from sim.robot.world import RobonautARcubeWorld
+
+    return RobonautARcubeWorld(**options)
+
+
+def import_quietly(module: str) -> None:
     """Import a module that prints a banner from C on standard error, without the banner.
 
     What comes there from this project is a fault, in one line.
@@ -56,3 +63,4 @@ def _import_quietly(module: str) -> None:
 
 
 gymnasium.register(id="sim/RenderedARcube-v0", entry_point="sim:make_rendered_arcube")
+gymnasium.register(id="sim/RobonautARcube-v0", entry_point="sim:make_robonaut_arcube")

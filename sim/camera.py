@@ -62,8 +62,8 @@ class Camera:
         right = right / np.linalg.norm(right)
         return np.column_stack([right, np.cross(forward, right), forward])
 
-    def render(self, client: int, light: Light) -> NDArray[np.uint8]:
-        """Return what the camera sees, RGB, shape [height, width, 3]."""
+    def render(self, client: int, light: Light, *, shadow: bool = False) -> NDArray[np.uint8]:
+        """Return what the camera sees, RGB, shape [height, width, 3]; shadows are for people, and slow."""
         width, height = self.image_size
         view = pybullet.computeViewMatrix(self.eye, self.target, self._up)
         projection = pybullet.computeProjectionMatrixFOV(self.field_of_view, width / height, _NEAR, _FAR)
@@ -76,7 +76,7 @@ class Camera:
             lightAmbientCoeff=light.ambient,
             lightDiffuseCoeff=light.diffuse,
             lightSpecularCoeff=0.0,
-            shadow=0,
+            shadow=int(shadow),
             renderer=pybullet.ER_TINY_RENDERER,
             flags=pybullet.ER_NO_SEGMENTATION_MASK,
             physicsClientId=client,

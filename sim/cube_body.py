@@ -20,6 +20,8 @@ from atg_fg.patterns import FloatArray
 
 CUBE_SIZE: Final = 0.28  # m
 TAG_SIZE: Final = 0.21  # m
+#: Where the cube's centre stands on the table, before the robot, m.
+CUBE_CENTRE: Final[FloatArray] = np.array([0.42, 0.0, 0.30])
 #: 5×5 tags: the first twelve differ in at least 10 bits, those of the 4×4 dictionary in 5.
 TAG_DICTIONARY: Final = cv2.aruco.DICT_5X5_50
 
@@ -55,6 +57,10 @@ def rotation_of(orientation: int) -> FloatArray:
     return np.asarray(sum(np.outer(FACE_NORMALS[place], FACE_NORMALS[faces[place]]) for place in (BACK, LEFT, TOP)))
 
 
+#: Of every orientation, shape [24, 3, 3].
+_ALL_ROTATIONS: Final[FloatArray] = np.array([rotation_of(orientation) for orientation in range(len(ORIENTATIONS))])
+
+
 def quaternion_of(rotation: FloatArray) -> tuple[float, float, float, float]:
     """Return the quaternion (x, y, z, w) of a rotation matrix."""
     vector = cv2.Rodrigues(rotation)[0].ravel()
@@ -72,9 +78,10 @@ class CubeBody:
 
     Args:
         client: PyBullet's physics client id.
+        mass: Kilograms; a cube without one is a picture that nothing moves or touches.
     """
 
-    def __init__(self, client: int) -> None:
+    def __init__(self, client: int, mass: float = 0.0) -> None:
         self.client = client
         # PyBullet reads meshes and textures when they are created; the files are not needed afterwards.
         with tempfile.TemporaryDirectory(prefix="arcube-") as folder:
@@ -88,7 +95,8 @@ class CubeBody:
                 meshScales=[[1, 1, 1]] * len(meshes),
                 physicsClientId=client,
             )
-            self.body = pybullet.createMultiBody(0, -1, shape, physicsClientId=client)
+            solid = _solid_box(client) if mass else -1
+            self.body = int(pybullet.createMultiBody(mass, solid, shape, physicsClientId=client))
 
     def _load_texture(self, symbol: int, folder: Path) -> int:
         path = folder / f"tag{symbol}.png"
@@ -107,11 +115,30 @@ class CubeBody:
                 physicsClientId=self.client,
             )
 
+    def pose(self) -> tuple[FloatArray, FloatArray]:
+        """Return the true position of the cube's centre, shape [3], m, and its rotation, shape [3, 3]."""
+        position, quaternion = pybullet.getBasePositionAndOrientation(self.body, physicsClientId=self.client)
+        rotation = np.array(pybullet.getMatrixFromQuaternion(quaternion)).reshape(3, 3)
+        return np.array(position), rotation
+
     def place(self, position: FloatArray, rotation: FloatArray) -> None:
         """Put the cube's centre at ``position`` (m), turned by a rotation matrix."""
         pybullet.resetBasePositionAndOrientation(
             self.body, position.tolist(), quaternion_of(rotation), physicsClientId=self.client
         )
+
+
+def _solid_box(client: int) -> int:
+    return int(
+        pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=[CUBE_SIZE / 2] * 3, physicsClientId=client)
+    )
+
+
+def nearest_orientation(rotation: FloatArray) -> tuple[int, float]:
+    """Return which of the 24 orientations a rotation matrix is nearest to, and how far it is from it, rad."""
+    traces = np.einsum("oij,ij->o", _ALL_ROTATIONS, rotation)
+    nearest = int(traces.argmax())
+    return nearest, float(np.arccos(np.clip((traces[nearest] - 1) / 2, -1, 1)))
 
 
 def _write_face(face: int, folder: Path) -> str:

@@ -6,7 +6,6 @@ import weakref
 from collections.abc import Sequence
 from typing import Any, Final
 
-import cv2
 import numpy as np
 import pybullet
 from numpy.typing import NDArray
@@ -15,12 +14,10 @@ from atg_fg.arcube import Cube
 from atg_fg.errors import InvalidInputError, unknown_name
 from atg_fg.patterns import FloatArray
 from atg_fg.worlds import ARcubeWorld
-from sim.camera import Camera, Light
-from sim.cube_body import CUBE_SIZE, CubeBody, rotation_of
+from sim.camera import Camera
+from sim.cube_body import CUBE_CENTRE, CUBE_SIZE, CubeBody, rotation_of
 from sim.detection import Marker, detect_markers, detected_symbols, draw_detections
-
-#: Where the cube's centre stands when nothing is jittered, m.
-CUBE_CENTRE: Final = np.array([0.42, 0.0, 0.30])
+from sim.imaging import Imaging, at_least_zero
 
 _MOST_PIXELS: Final = 2048
 _WOOD, _FLOOR = [0.66, 0.50, 0.34, 1.0], [0.80, 0.82, 0.84, 1.0]
@@ -67,12 +64,10 @@ class RenderedARcubeWorld(ARcubeWorld):
         super().__init__(cubes, slip=slip, wrong=wrong, missing=missing, render_mode=render_mode)
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise unknown_name("render mode", render_mode, self.metadata["render_modes"])
-        self.position_jitter = _at_least_zero("position_jitter", position_jitter)
-        self.yaw_jitter = _at_least_zero("yaw_jitter", yaw_jitter)
-        self.light_jitter = _at_least_zero("light_jitter", light_jitter)
-        self.image_noise = _at_least_zero("image_noise", image_noise)
-        self.blur = _at_least_zero("blur", blur)
-        width, height = _checked_size(image_size)
+        self.position_jitter = at_least_zero("position_jitter", position_jitter)
+        self.yaw_jitter = at_least_zero("yaw_jitter", yaw_jitter)
+        self.imaging = Imaging(light_jitter, image_noise, blur)
+        width, height = checked_size(image_size)
         self.camera = Camera(image_size=(width, height))
         self.frame: NDArray[np.uint8] = np.zeros((height, width, 3), dtype=np.uint8)
         self.markers: list[Marker] = []
@@ -123,22 +118,9 @@ class RenderedARcubeWorld(ARcubeWorld):
 
     def _detect(self) -> tuple[int, int]:
         """Take a frame and return the symbols detected in it."""
-        frame = self.camera.render(self._client, self._light())
-        if self.blur:
-            frame = np.asarray(cv2.GaussianBlur(frame, (0, 0), self.blur), dtype=np.uint8)
-        if self.image_noise:
-            noisy = frame + self.np_random.normal(0.0, self.image_noise, (*frame.shape[:2], 1))
-            frame = np.clip(np.round(noisy), 0, 255).astype(np.uint8)
-        self.frame = frame
-        self.markers = detect_markers(frame, self.camera)
+        self.frame = self.imaging.frame(self.camera, self._client, self.np_random)
+        self.markers = detect_markers(self.frame, self.camera)
         return detected_symbols(self.markers)
-
-    def _light(self) -> Light:
-        if not self.light_jitter:
-            return Light()
-        change = self.light_jitter * self.np_random.uniform(-1, 1, 3)
-        x, y, z = Light().direction
-        return Light((x + change[0], y + change[1], z), Light().ambient, Light().diffuse * (1 + 0.5 * change[2]))
 
     def _truth(self, *, slipped: bool) -> dict[str, Any]:
         truth = super()._truth(slipped=slipped)
@@ -147,13 +129,7 @@ class RenderedARcubeWorld(ARcubeWorld):
         return truth
 
 
-def _at_least_zero(name: str, value: float) -> float:
-    if not 0 <= value < np.inf:
-        raise InvalidInputError(f"{name}: {value!r}; expected a finite number of at least 0")
-    return float(value)
-
-
-def _checked_size(size: Sequence[int]) -> tuple[int, int]:
+def checked_size(size: Sequence[int]) -> tuple[int, int]:
     """Return (width, height), or raise ``InvalidInputError``."""
     whole = isinstance(size, Sequence) and all(isinstance(pixels, (int, np.integer)) for pixels in size)
     if not whole or len(size) != 2 or not all(16 <= pixels <= _MOST_PIXELS for pixels in size):

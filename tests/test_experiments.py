@@ -1,9 +1,12 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from atg_fg.errors import InvalidInputError, UnknownNameError
 from atg_fg.experiments import TestPlan, TestResult, figure3_points, run_test, run_tests, summarise
-from atg_fg.parameters import ModelParameters, preset
+from atg_fg.parameters import ModelParameters
+from atg_fg.presets import preset
 
 QUICK = TestPlan(engine="bayes-filter", n_trials=30, n_actions=6)
 
@@ -103,3 +106,51 @@ def test_unknown_names_are_refused_before_any_work():
         run_test(TestPlan(world="magic", parameters=ModelParameters()), 0)
     with pytest.raises(InvalidInputError, match="jobs: 0"):
         next(run_tests([(QUICK, 0)], jobs=0))
+
+
+class TestRecords:
+    PLAN = TestPlan(engine="bayes-filter", n_trials=12, n_actions=4, world_options={"missing": 0.1})
+
+    def test_a_test_that_was_cut_off_goes_on_and_comes_to_the_same(self, tmp_path):
+        whole = run_test(self.PLAN, 2, tmp_path / "whole")
+        run_so_far = []
+
+        def stop(number, record):
+            run_so_far.append(number)
+            if number == 6:
+                raise KeyboardInterrupt
+
+        with pytest.raises(KeyboardInterrupt):
+            run_test(self.PLAN, 2, tmp_path / "cut", on_trial=stop)
+        rest = []
+        resumed = run_test(self.PLAN, 2, tmp_path / "cut", True, on_trial=lambda number, _: rest.append(number))
+        assert run_so_far + rest == list(range(12))
+        assert resumed == whole == run_test(self.PLAN, 2)
+        name = "test-0002.jsonl.gz"
+        assert (tmp_path / "cut" / name).read_bytes() == (tmp_path / "whole" / name).read_bytes()
+
+    def test_a_finished_test_is_only_read(self, tmp_path):
+        whole = run_test(self.PLAN, 0, tmp_path)
+        rest = []
+        assert run_test(self.PLAN, 0, tmp_path, True, on_trial=lambda number, _: rest.append(number)) == whole
+        assert rest == []
+
+    def test_records_of_another_plan_are_refused(self, tmp_path):
+        run_test(self.PLAN, 0, tmp_path)
+        with pytest.raises(InvalidInputError, match="expected the trials of"):
+            run_test(replace(self.PLAN, n_actions=5), 0, tmp_path, True)
+        with pytest.raises(InvalidInputError, match="already there"):
+            run_test(self.PLAN, 0, tmp_path)
+
+    def test_each_of_several_processes_keeps_the_records_of_its_tests(self, tmp_path):
+        plans = [(self.PLAN, seed) for seed in range(2)]
+        results = list(run_tests(plans, 2, tmp_path))
+        assert results == [run_test(self.PLAN, seed) for seed in range(2)]
+        assert list(run_tests(plans, 1, tmp_path, True)) == results
+
+
+def test_trials_without_a_verdict_are_counted_and_are_no_success():
+    result = run_test(TestPlan(engine="bayes-filter", world_options={"missing": 1.0}, n_trials=5), 0)
+    assert (result.identification, result.success, result.undecided, result.lost) == ((0, 5), (0, 5), 5, 0)
+    summary = summarise([result])
+    assert (summary["undecided"], summary["lost"], summary["tests"][0]["undecided"]) == (5, 0, 5)

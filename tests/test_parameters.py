@@ -3,8 +3,8 @@ from math import inf, nan
 import numpy as np
 import pytest
 
-from atg_fg.errors import InvalidInputError, UnknownNameError
-from atg_fg.parameters import PRESETS, ModelParameters, preset
+from atg_fg.errors import InvalidInputError
+from atg_fg.parameters import ModelParameters
 
 
 @pytest.mark.parametrize("alpha", [-1e-9, -1, nan, inf, -inf, "1", None, True, 10**400])
@@ -29,14 +29,3 @@ def test_learning_is_on_or_off_and_nothing_else(learn: object) -> None:
 def test_whole_numbers_and_bounds_are_accepted(alpha: float, delta: float) -> None:
     parameters = ModelParameters(alpha, delta)
     assert (parameters.transition_concentration, parameters.observation_noise) == (alpha, delta)
-
-
-def test_presets_are_those_of_the_model_page() -> None:
-    assert preset("paper") == ModelParameters(1e-8, 1e-8, learn_in_trial=False)
-    assert preset("default") == ModelParameters(1e-8, 1e-8, learn_in_trial=True)
-    assert ModelParameters() == PRESETS["default"]
-
-
-def test_an_unknown_preset_is_refused_with_the_names_there_are() -> None:
-    with pytest.raises(UnknownNameError, match="default, paper"):
-        preset("Paper")

@@ -8,10 +8,10 @@ from atg_fg.assumptions import arcube_assumptions
 from atg_fg.engines import begin_trial
 from atg_fg.errors import InvalidInputError
 from atg_fg.memory import RobotMemory
-from atg_fg.parameters import preset
 from atg_fg.policies import EntropyPolicy, RandomPolicy
+from atg_fg.presets import preset
 from atg_fg.trial import run_trial
-from atg_fg.worlds import make_world
+from atg_fg.worlds import ARcubeWorld, make_world
 
 
 def a_trial(memory, seed=0, n_actions=5, policy=None, engine="bayes-filter", **world_options):
@@ -88,3 +88,57 @@ def test_a_world_with_other_spaces_is_refused(empty):
     world = gymnasium.make("CartPole-v1")
     with pytest.raises(InvalidInputError, match=r"world: .*expected 3 actions"):
         run_trial(world, inference, EntropyPolicy(), 3, np.random.default_rng(0))
+
+
+class EndingWorld(ARcubeWorld):
+    """Ends the episode after two actions, and says what it is told to."""
+
+    def __init__(self, **ending):
+        super().__init__()
+        self.ending, self.n_actions = ending, 0
+
+    def step(self, action):
+        observation, reward, _, _, truth = super().step(action)
+        self.n_actions += 1
+        return (
+            observation,
+            reward,
+            self.n_actions == 2,
+            False,
+            {**truth, **(self.ending if self.n_actions == 2 else {})},
+        )
+
+
+def ended(memory, **ending):
+    inference = begin_trial("bayes-filter", memory, preset("default"))
+    return run_trial(EndingWorld(**ending), inference, EntropyPolicy(), 5, np.random.default_rng(0))
+
+
+def test_a_world_that_ends_the_episode_ends_the_trial_with_a_last_look(empty):
+    record = ended(empty)
+    assert (len(record.steps), len(record.actions)) == (3, 2)
+    assert record.verdict == "novel"
+
+
+def test_a_lost_object_ends_the_trial_without_a_verdict_on_it(empty):
+    record = ended(empty, lost=True)
+    assert (len(record.steps), len(record.actions)) == (2, 2)
+    assert (record.verdict, record.judged_novel, record.matched) == ("lost", False, None)
+    last = json.loads(record.to_json_lines().splitlines()[-1])["verdict"]
+    assert (last["outcome"], last["judged_novel"], last["matched"], last["truth"]["lost"]) == (
+        "lost",
+        False,
+        None,
+        True,
+    )
+
+
+def test_a_trial_in_which_nothing_was_seen_is_undecided(empty):
+    record = a_trial(empty, missing=1.0)
+    assert (record.verdict, record.judged_novel, record.matched) == ("undecided", False, None)
+
+
+def test_one_symbol_is_enough_to_decide(empty):
+    record = a_trial(empty, missing=0.9, n_actions=10)
+    assert any(symbol is not None for step in record.steps for symbol in step.detection)
+    assert record.verdict == "novel"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from importlib.metadata import entry_points
 
 import typer
 import typer.exceptions
@@ -23,6 +24,9 @@ app.command()(experiments.figure3)
 app.command()(trials.trial)
 app.command()(trials.replay)
 app.add_typer(memory.app, name="memory")
+# Packages beside this one, such as ``sim``, add groups of commands by an entry point.
+for group in entry_points(group="atg_fg.commands"):
+    app.add_typer(group.load(), name=group.name)
 
 
 def main() -> None:

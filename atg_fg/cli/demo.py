@@ -1,4 +1,4 @@
-"""``atg-fg demo``: one recognition trial on camera images, told step by step."""
+"""``atg-fg demo``: one recognition trial on the robot, told step by step, and filmed."""
 
 from __future__ import annotations
 
@@ -17,27 +17,35 @@ from atg_fg.cli.story import Story
 from atg_fg.engines import begin_trial
 from atg_fg.experiments import learn_from
 from atg_fg.memory import RobotMemory
-from atg_fg.parameters import preset as preset_named
 from atg_fg.policies import EntropyPolicy, RandomPolicy
+from atg_fg.presets import preset as preset_named
 from atg_fg.trial import TrialRecord, run_trial
 from atg_fg.worlds import World, make_world
 
 N_REMEMBERED = 6
-#: Options of the worlds that have a camera whose last frame is to be saved.
-CAMERAS: Final[dict[str, dict[str, Any]]] = {"rendered": {"render_mode": "detections", "image_size": (640, 480)}}
+#: Options of the worlds that have a camera: its last frame is saved, or a film of the trial.
+CAMERAS: Final[dict[str, dict[str, Any]]] = {
+    "rendered": {"render_mode": "detections", "image_size": (640, 480)},
+    "robonaut": {"render_mode": "rgb_array_list"},
+}
 
 
 def demo(
-    world: options.World = "rendered",
+    world: options.World = "robonaut",
     engine: options.Engine = "gtsam",
     preset: options.Preset = "default",
     actions: options.Actions = 8,
     novel: Annotated[bool, typer.Option("--novel", help="Present an object the robot has never met.")] = False,
     output: Annotated[Path, typer.Option(help="Folder for the pictures, the memory and the record.")] = Path("out"),
+    condition: options.Condition = None,
+    urdf: options.Urdf = None,
     seed: options.Seed = 0,
     json_file: options.JsonFile = None,
 ) -> None:
-    """Let the robot learn a small memory, then recognise an object from camera images, step by step.
+    """Let the robot recognise one of the objects it remembers by turning it over, told step by step.
+
+    The memory is learned beforehand, from the same objects turned at random in the ideal world. With a camera, the last
+    frame is saved, or a film of the robot.
 
     Example: atg-fg demo --seed 1 --novel
     """
@@ -52,10 +60,12 @@ def demo(
     memory = RobotMemory(arcube_assumptions())
     begin_trial(engine, memory, parameters)
     # The last cube is the one the robot never meets while it learns.
-    camera = CAMERAS.get(world, {})
-    with closing(make_world(world, cubes=make_arcubes(N_REMEMBERED + 1, seed), **camera)) as made_world:
-        console.print(f"The robot turns {N_REMEMBERED} cubes over and remembers what it sees …")
-        _learn(made_world, memory, np.random.default_rng(learn_seed))
+    cubes = make_arcubes(N_REMEMBERED + 1, seed)
+    console.print(f"The robot remembers {N_REMEMBERED} cubes that it turned over before.")
+    with closing(make_world("ideal", cubes=cubes)) as ideal_world:
+        _learn(ideal_world, memory, np.random.default_rng(learn_seed))
+    world_options = {**CAMERAS.get(world, {}), **options.world_options(condition=condition, urdf=urdf)}
+    with closing(make_world(world, cubes=cubes, **world_options)) as made_world:
         rng = np.random.default_rng(trial_seed)
         presented = N_REMEMBERED if novel else int(rng.integers(N_REMEMBERED))
         story = Story(console, memory)
@@ -74,7 +84,13 @@ def demo(
         _save(folder, made_world, record, memory)
     saved = [str(path) for path in sorted(folder.iterdir())]
     console.print(f"saved:   {', '.join(saved)}")
-    document = {"command": "demo", "judged_novel": record.judged_novel, "matched": record.matched, "truth": truth}
+    document = {
+        "command": "demo",
+        "outcome": record.verdict,
+        "judged_novel": record.judged_novel,
+        "matched": record.matched,
+        "truth": truth,
+    }
     options.write_json({**document, "saved": saved}, json_file)
 
 
@@ -87,10 +103,12 @@ def _learn(world: World, memory: RobotMemory, rng: np.random.Generator) -> None:
 
 
 def _save(folder: Path, world: World, record: TrialRecord, memory: RobotMemory) -> None:
-    """Save the last camera frame, the plots, the record, and the memory with what the trial taught."""
-    frame = world.render() if world.render_mode else None
-    if isinstance(frame, np.ndarray):
-        figures.save_image(frame, folder / "frame.png")
+    """Save the film or the last camera frame, the plots, the record, and the memory with what the trial taught."""
+    picture: Any = world.render() if world.render_mode else None
+    if isinstance(picture, list):
+        figures.save_film(picture, world.metadata["render_fps"], folder / "film.gif")
+    elif picture is not None:
+        figures.save_image(picture, folder / "frame.png")
     beliefs = [step.belief for step in record.steps]
     figures.save_figure(plots.plot_belief(beliefs, record.names), folder / "belief.png")
     actions = record.assumptions.actions

@@ -15,9 +15,9 @@ from atg_fg import figures, store
 from atg_fg.cli import options
 from atg_fg.errors import InvalidInputError
 from atg_fg.experiments import TestPlan, TestResult, figure3_points, run_tests, summarise
-from atg_fg.parameters import preset as preset_named
 from atg_fg.plots import plot_success
 from atg_fg.policies import POLICIES
+from atg_fg.presets import preset as preset_named
 
 #: The average row of Table 1 as printed in the paper (5 tests, 10 actions a trial).
 PAPER_TABLE1 = {"identification": 0.816, "recognition": 0.907, "success": 0.792}
@@ -35,7 +35,11 @@ def table1(
     slip: options.Slip = 0.0,
     wrong: options.Wrong = 0.0,
     missing: options.Missing = 0.0,
+    condition: options.Condition = None,
+    urdf: options.Urdf = None,
     jobs: options.Jobs = None,
+    records: Annotated[Path | None, typer.Option(help="Folder in which every trial is saved as it ends.")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Go on after the trials that --records holds.")] = False,
     json_file: options.JsonFile = None,
 ) -> None:
     """Run the paper's Table 1: tests of 100 trials, each from an empty robot memory.
@@ -45,9 +49,12 @@ def table1(
     options.check_at_least(1, tests=tests, actions=actions, trials=trials, jobs=jobs)
     options.check_at_least(0, seed=seed)
     options.check_json_option(json_file)
+    if resume and records is None:
+        raise InvalidInputError("--resume: no records to go on from; expected --records with their folder")
+    world_options = options.world_options(slip, wrong, missing, condition, urdf)
     plan = TestPlan(
         world=world,
-        world_options=options.world_options(slip, wrong, missing),
+        world_options=world_options,
         engine=engine,
         policy=policy,
         parameters=preset_named(preset),
@@ -56,7 +63,8 @@ def table1(
     )
     with options.progress_bar("tests", tests) as advance:
         results = []
-        for result in run_tests([(plan, seed + test) for test in range(tests)], jobs or options.available_cpus()):
+        plans = [(plan, seed + test) for test in range(tests)]
+        for result in run_tests(plans, jobs or options.available_cpus(), records, resume):
             results.append(result)
             advance()
     summary = summarise(results)
@@ -72,6 +80,7 @@ def table1(
         "slip": slip,
         "wrong": wrong,
         "missing": missing,
+        **world_options,
     }
     options.write_json({"command": "table1", "parameters": parameters, **summary}, json_file)
     if json_file != "-":
@@ -92,6 +101,9 @@ def _table1(title: str, results: Iterable[TestResult], summary: dict[str, Any]) 
     table.add_row("average", *(_percent(summary["average"][score]) for score in scores), style="bold")
     intervals = (summary["interval95"][score] for score in scores)
     table.add_row("95% interval", *(f"{100 * low:.1f}-{100 * high:.1f}%" for low, high in intervals))
+    for ending in ("lost", "undecided"):
+        if summary[ending]:
+            table.add_row(f"{ending} trials", str(summary[ending]))
     table.add_row("paper", *(_percent(PAPER_TABLE1[score]) for score in scores))
     return table
 

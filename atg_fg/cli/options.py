@@ -7,6 +7,7 @@ import os
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Annotated, Any
 
 import typer
@@ -16,8 +17,8 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 from atg_fg import store
 from atg_fg.engines import ENGINES
 from atg_fg.errors import InvalidInputError
-from atg_fg.parameters import PRESETS
 from atg_fg.policies import POLICIES
+from atg_fg.presets import PRESETS
 from atg_fg.worlds import WORLDS, probability_option
 
 
@@ -28,7 +29,7 @@ def available_cpus() -> int:
 
 World = Annotated[str, typer.Option(help=f"World: {', '.join(WORLDS)}, or module:namespace/Id-v0 of your own.")]
 Engine = Annotated[str, typer.Option(help=f"Inference engine: {', '.join(ENGINES)}.")]
-Preset = Annotated[str, typer.Option(help=f"Model parameters: {', '.join(PRESETS)}.")]
+Preset = Annotated[str, typer.Option(help=f"Model parameters: {', '.join(PRESETS)}, or a .json file of your own.")]
 Policy = Annotated[str, typer.Option(help=f"Policy: {', '.join(POLICIES)}.")]
 Seed = Annotated[int, typer.Option(help="Seed; test number k uses seed + k.")]
 Actions = Annotated[int, typer.Option(help="Actions a trial.")]
@@ -43,12 +44,27 @@ JsonFile = Annotated[
 Slip = Annotated[float, typer.Option(help="Probability that an action fails and the cube stays.")]
 Wrong = Annotated[float, typer.Option(help="Probability that a look shows a pattern drawn at random.")]
 Missing = Annotated[float, typer.Option(help="Probability, a slot, that its symbol is not detected.")]
+Condition = Annotated[
+    str | None, typer.Option(help="What the robot works under: nominal or worn (world robonaut; nominal if not given).")
+]
+Urdf = Annotated[Path | None, typer.Option(help="Your own description of the robot, such as NASA's (world robonaut).")]
 
 
-def world_options(slip: float, wrong: float, missing: float) -> dict[str, float]:
-    """Return the noise options that are not zero, for the world."""
-    options = {"slip": slip, "wrong": wrong, "missing": missing}
-    return {name: probability_option(f"--{name}", value) for name, value in options.items() if value}
+def world_options(
+    slip: float = 0.0,
+    wrong: float = 0.0,
+    missing: float = 0.0,
+    condition: str | None = None,
+    urdf: Path | None = None,
+) -> dict[str, Any]:
+    """Return the options for the world that are not zero and given."""
+    noise = {"slip": slip, "wrong": wrong, "missing": missing}
+    given: dict[str, Any] = {name: probability_option(f"--{name}", value) for name, value in noise.items() if value}
+    if condition is not None:
+        given["condition"] = condition
+    if urdf is not None:
+        given["urdf"] = str(urdf)
+    return given
 
 
 def check_at_least(least: int, **numbers: int | None) -> None:

@@ -45,7 +45,11 @@ class Story:
     def verdict(self, record: TrialRecord) -> None:
         """Print what the object was judged to be."""
         belief = record.belief
-        if record.judged_novel:
+        if record.verdict == "lost":
+            text = "verdict: none, the object was lost"
+        elif record.verdict == "undecided":
+            text = "verdict: none, nothing was seen"
+        elif record.verdict == "novel":
             text = f"verdict: a new object (unseen with probability {belief.unseen:.1%})"
         else:
             best = belief.most_probable_object

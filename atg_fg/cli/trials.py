@@ -20,8 +20,8 @@ from atg_fg.cli.story import Story
 from atg_fg.engines import begin_trial
 from atg_fg.experiments import learn_from
 from atg_fg.memory import RobotMemory
-from atg_fg.parameters import preset as preset_named
 from atg_fg.policies import make_policy
+from atg_fg.presets import preset as preset_named
 from atg_fg.scripted_trial import read_script
 from atg_fg.scripted_trial import replay as replay_script
 from atg_fg.trial import run_trial
@@ -44,6 +44,8 @@ def trial(
     slip: options.Slip = 0.0,
     wrong: options.Wrong = 0.0,
     missing: options.Missing = 0.0,
+    condition: options.Condition = None,
+    urdf: options.Urdf = None,
     json_file: options.JsonFile = None,
 ) -> None:
     """Run one recognition trial, tell it step by step, and learn from it.
@@ -61,7 +63,9 @@ def trial(
     chosen_policy = make_policy(policy)
     cubes = {"cubes": make_arcubes(100, cubes_seed)} if world in WORLDS else {}
     story = Story(options.console(json_file), remembered)
-    with closing(make_world(world, **cubes, **options.world_options(slip, wrong, missing))) as made_world:
+    with closing(
+        make_world(world, **cubes, **options.world_options(slip, wrong, missing, condition, urdf))
+    ) as made_world:
         rng = np.random.default_rng(np.random.SeedSequence(seed))
         result = run_trial(made_world, inference, chosen_policy, actions, rng, on_step=story.tell)
     story.verdict(result)
@@ -77,6 +81,7 @@ def trial(
         "command": "trial",
         "parameters": header,
         "steps": steps,
+        "outcome": result.verdict,
         "judged_novel": result.judged_novel,
         "matched": result.matched,
         "learned": learned,

@@ -4,8 +4,16 @@ import os
 from atg_fg import store
 
 
+def test_the_demo_films_the_robot(run, tmp_path):
+    status, output, error = run("demo", "--output", tmp_path / "out", "--actions", "1", "--engine", "bayes-filter")
+    assert (status, error) == (0, "")
+    assert "look 1: front" in output
+    assert (tmp_path / "out" / "film.gif").read_bytes().startswith(b"GIF89a")
+    assert {"belief.png", "entropy.png", "memory.json", "trial.jsonl"} < set(os.listdir(tmp_path / "out"))
+
+
 def test_the_demo_recognises_an_object_from_camera_images(run, tmp_path):
-    status, output, error = run("demo", "--output", tmp_path / "out", "--actions", "5")
+    status, output, error = run("demo", "--world", "rendered", "--output", tmp_path / "out", "--actions", "5")
     assert (status, error) == (0, "")
     assert "look 0: front" in output
     assert "expected entropy" in output

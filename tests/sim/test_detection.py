@@ -3,8 +3,9 @@ import pytest
 
 from atg_fg.worlds import MISSING
 from sim.camera import Camera, Light
+from sim.cube_body import CUBE_CENTRE
 from sim.detection import Marker, detect_markers, detected_symbols, draw_detections, slot_marker
-from sim.rendered import CUBE_CENTRE, RenderedARcubeWorld
+from sim.rendered import RenderedARcubeWorld
 
 FRONT, TOP, LEFT, TILTED = [-1, 0, 0], [0, 0, 1], [0, 1, 0], [-1, 0, 0.5]
 

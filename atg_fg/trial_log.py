@@ -1,0 +1,158 @@
+"""The trials of one test in a file that grows trial by trial, and is sound whenever it is cut off.
+
+Each line is a gzip member of its own: a header, then a trial a line. A writer that is killed leaves at most half of the
+last member, which ``read`` drops.
+"""
+
+from __future__ import annotations
+
+import gzip
+import json
+import zlib
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from atg_fg.assumptions import Assumptions
+from atg_fg.errors import InvalidInputError
+from atg_fg.json_format import plain_json
+from atg_fg.patterns import Detection, Evidence
+from atg_fg.store import check_writable, write_bytes_atomically
+from atg_fg.trial import TrialRecord, Verdict
+
+_FORMAT = {"format": "atg-fg/test", "version": 1}
+_GZIP = 31  # zlib's name for data with a gzip header
+
+
+@dataclass(frozen=True)
+class TrialOutcome:
+    """What scoring and learning need of a trial.
+
+    Attributes:
+        verdict: How it ended.
+        matched: Name of the ATG the object was matched to.
+        patterns: Index of the pattern at each look, ``None`` where it was not complete.
+        actions: Index of each action.
+        object: What was presented, by the world's truth.
+    """
+
+    verdict: Verdict
+    matched: str | None
+    patterns: tuple[int | None, ...]
+    actions: tuple[int, ...]
+    object: object
+
+    @classmethod
+    def of(cls, record: TrialRecord) -> TrialOutcome:
+        """Return the outcome of a trial that has just been run."""
+        truth = record.steps[0].truth["object"]
+        return cls(record.verdict, record.matched, tuple(record.patterns), tuple(record.actions), truth)
+
+
+class TrialLog:
+    """The trials of one test on disk.
+
+    Args:
+        path: The file, ``….jsonl.gz``.
+        header: What test this is; a file of another one is refused.
+        assumptions: Of the memory; names the actions.
+    """
+
+    def __init__(self, path: Path, header: Mapping[str, Any], assumptions: Assumptions) -> None:
+        self.path = path
+        self._assumptions = assumptions
+        self._header = json.loads(json.dumps({**_FORMAT, **header}, default=plain_json))
+
+    def begin(self) -> list[TrialOutcome]:
+        """Make the file, with its header, and return the trials in it: none.
+
+        Raises:
+            InvalidInputError: It is already there, or cannot be written.
+        """
+        if self.path.exists():
+            raise InvalidInputError(f"{self.path}: is already there; expected another folder, or --resume to go on")
+        check_writable(self.path)
+        write_bytes_atomically(self.path, _member(self._header))
+        return []
+
+    def resume(self) -> list[TrialOutcome]:
+        """Return the trials that are in the file, cutting off half a trial at its end; begin it if it is not there.
+
+        Raises:
+            InvalidInputError: The file cannot be read, or is of another test.
+        """
+        if not self.path.exists():
+            return self.begin()
+        lines, sound = _sound_lines(self.path)
+        if not lines or lines[0] != self._header:
+            found = json.dumps(lines[0]) if lines else "nothing"
+            raise InvalidInputError(f"{self.path}: holds {found}; expected the trials of {json.dumps(self._header)}")
+        with self.path.open("r+b") as file:
+            file.truncate(sound)
+        return [self._outcome(line) for line in lines[1:]]
+
+    def append(self, record: TrialRecord) -> None:
+        """Add a trial to the file."""
+        with self.path.open("ab") as file:
+            file.write(_member(self._line(record)))
+
+    def _line(self, record: TrialRecord) -> dict[str, Any]:
+        truths = [step.truth for step in record.steps]
+        return {
+            "verdict": record.verdict,
+            "matched": record.matched,
+            "observed": [step.detection for step in record.steps],
+            "actions": [self._assumptions.actions[action] for action in record.actions],
+            "unseen": [step.belief.unseen for step in record.steps],
+            "entropy": [step.belief.entropy for step in record.steps],
+            "truth": truths if record.lost_truth is None else [*truths, record.lost_truth],
+        }
+
+    def _outcome(self, line: dict[str, Any]) -> TrialOutcome:
+        alphabet, names = self._assumptions.alphabet, self._assumptions.actions
+        try:
+            seen: list[Detection] = [tuple(detection) for detection in line["observed"]]
+            return TrialOutcome(
+                line["verdict"],
+                line["matched"],
+                tuple(Evidence.of_detection(alphabet, detection).pattern for detection in seen),
+                tuple(names.index(action) for action in line["actions"]),
+                line["truth"][0]["object"],
+            )
+        except (KeyError, IndexError, TypeError, ValueError) as error:
+            raise InvalidInputError(f"{self.path}: {error!r}; expected a trial a line") from error
+
+
+def read_trials(path: Path) -> list[dict[str, Any]]:
+    """Return the trials in a file as they were logged, without the header; half a trial at the end is left out.
+
+    Raises:
+        InvalidInputError: The file cannot be read, or is not such a file.
+    """
+    lines, _ = _sound_lines(path)
+    if not lines or {name: lines[0].get(name) for name in _FORMAT} != _FORMAT:
+        raise InvalidInputError(f"{path}: is not a log of trials; expected a file that --records wrote")
+    return lines[1:]
+
+
+def _member(line: Mapping[str, Any]) -> bytes:
+    text = json.dumps(line, default=plain_json, allow_nan=False, separators=(",", ":")) + "\n"
+    return gzip.compress(text.encode(), mtime=0)
+
+
+def _sound_lines(path: Path) -> tuple[list[dict[str, Any]], int]:
+    """Return the lines of all whole members, and how many bytes they are."""
+    try:
+        data = memoryview(path.read_bytes())
+        lines, sound = [], 0
+        while sound < len(data):
+            member = zlib.decompressobj(_GZIP)
+            text = member.decompress(data[sound:])
+            if not member.eof:
+                break
+            lines.append(json.loads(text))
+            sound = len(data) - len(member.unused_data)
+    except (OSError, zlib.error, ValueError) as error:
+        raise InvalidInputError(f"{path}: cannot be read: {error}; expected a log of trials") from error
+    return lines, sound

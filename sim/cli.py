@@ -1,0 +1,148 @@
+"""``atg-fg sim``: how reliable the robot is, the noise that recognition should assume, and pictures of it at work.
+
+The command line of ``atg_fg`` finds this group by its entry point; nothing there imports it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.table import Table
+
+from atg_fg import figures, store
+from atg_fg.cli import options
+from atg_fg.presets import write_preset
+
+app = typer.Typer(help="The simulated robot: reliability, calibration, pictures.", no_args_is_help=True)
+
+Condition = Annotated[str, typer.Option(help="What the robot works under: nominal or worn.")]
+Actions = Annotated[int, typer.Option(help="Number of random actions.")]
+
+
+@app.command()
+def reliability(
+    condition: Condition = "nominal",
+    actions: Actions = 1000,
+    seed: Annotated[int, typer.Option(help="Seed of cubes, actions and circumstances.")] = 0,
+    urdf: options.Urdf = None,
+    jobs: options.Jobs = None,
+    json_file: options.JsonFile = None,
+) -> None:
+    """Let the robot do random actions and count, by the simulator's truth, how often they come out right.
+
+    Example: atg-fg sim reliability --condition worn --actions 200 --json worn.json
+    """
+    from sim.robot.reliability import summarise
+
+    runs = _run(condition, actions, seed, urdf, jobs, json_file)
+    summary = summarise(runs)
+    parameters = {"condition": condition, "actions": actions, "seed": seed}
+    options.write_json({"command": "sim reliability", "parameters": parameters, **summary}, json_file)
+    if json_file != "-":
+        options.console().print(_reliability_table(f"{condition}: {actions} random actions, seed {seed}", summary))
+
+
+@app.command()
+def calibrate(
+    files: Annotated[list[Path], typer.Argument(help="What sim reliability --json wrote.", show_default=False)],
+    output: Annotated[Path, typer.Option(help="Preset file to write; --preset takes it.")] = Path("robot.json"),
+    json_file: options.JsonFile = None,
+) -> None:
+    """Estimate the noise of actions and looks from reliability runs, and write the preset that assumes as much.
+
+    Example: atg-fg sim calibrate worn.json --output robot.json
+    """
+    from sim.robot.calibration import calibrate as estimate
+    from sim.robot.calibration import read_counts
+
+    options.check_json_option(json_file)
+    store.check_writable(output)
+    counts = read_counts(files)
+    parameters, missing_rate = estimate(counts)
+    command = f"atg-fg sim calibrate {' '.join(map(str, files))}"
+    document = write_preset(parameters, missing_rate=missing_rate, measured=asdict(counts), command=command)
+    options.write_json(document, str(output))
+    options.write_json({"command": "sim calibrate", "output": str(output), "preset": document}, json_file)
+    if json_file != "-":
+        for name, value in {**document["parameters"], "missing_rate": missing_rate}.items():
+            typer.echo(f"{name}: {value}")
+        typer.echo(f"saved: {output}")
+
+
+@app.command()
+def picture(
+    output: Annotated[Path, typer.Option(help="PNG file to write.")] = Path("robot.png"),
+    film: Annotated[Path | None, typer.Option(help="Write the robot's three actions as an animated GIF.")] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the cube.")] = 0,
+    urdf: options.Urdf = None,
+) -> None:
+    """Draw the robot as it turns a cube over: a strip of one flip, and what its head sees.
+
+    Example: atg-fg sim picture --output robot.png --film actions.gif
+    """
+    options.check_at_least(0, seed=seed)
+    from sim.robot.pictures import draw_actions, draw_flip
+
+    figures.check_figure_path(output)
+    figures.save_image(draw_flip(seed, urdf), output)
+    if film is not None:
+        figures.save_film(*draw_actions(seed, urdf), film)
+    typer.echo(f"saved: {output}" + ("" if film is None else f", {film}"))
+
+
+def _run(
+    condition: str, actions: int, seed: int, urdf: Path | None, jobs: int | None, json_file: str | None
+) -> list[Any]:
+    """Check the options and run the actions, with a progress bar."""
+    from sim.robot.reliability import ACTIONS_A_TRIAL, run_actions
+
+    options.check_at_least(1, actions=actions, jobs=jobs)
+    options.check_at_least(0, seed=seed)
+    options.check_json_option(json_file)
+    with options.progress_bar("trials", -(-actions // ACTIONS_A_TRIAL)) as advance:
+        return run_actions(condition, actions, seed, jobs or options.available_cpus(), urdf, advance)
+
+
+def _reliability_table(title: str, summary: dict[str, Any]) -> Table:
+    table = Table(title=title, title_justify="left")
+    for heading in ("", "count", "rate", "95% interval"):
+        table.add_column(heading, justify="left" if not heading else "right")
+    rows = {"right": summary["success"], **{f"  {name}": rate for name, rate in summary["by_action"].items()}}
+    rows |= {f"{name.replace('_', ' ')} detected": rate for name, rate in summary["detection"].items()}
+    for name, rate in rows.items():
+        if rate["of"]:
+            low, high = rate["interval95"]
+            table.add_row(
+                name,
+                f"{rate['count']}/{rate['of']}",
+                f"{100 * rate['rate']:.1f}%",
+                f"{100 * low:.1f}-{100 * high:.1f}%",
+            )
+    table.add_section()
+    spreads = {
+        "angle error, degrees": (summary["angle_error_degrees"], 1.0),
+        "position error, mm": (summary["position_error_metres"], 1000.0),
+        "peak force of a hand, N": (summary["peak_force_newtons"], 1.0),
+        "simulated seconds an action": (summary["simulated_seconds_per_action"], 1.0),
+    }
+    for name, (spread, unit) in spreads.items():
+        texts = (f"{key} {unit * value:.2f}" for key, value in spread.items() if value is not None)
+        table.add_row(name, *texts)
+    joints, timing = summary["joints"], summary["timing"]
+    table.add_section()
+    table.add_row("failures", *(f"{name.replace('_', ' ')} {count}" for name, count in summary["failures"].items()))
+    table.add_row(
+        "joints, of their limits",
+        f"speed {joints['largest_share_of_velocity_limit']:.2f}",
+        f"torque {joints['largest_share_of_effort_limit']:.2f}",
+        f"self-contacts {joints['self_contacts']}",
+    )
+    table.add_row(
+        "wall clock",
+        f"{timing['wall_seconds_per_action']:.2f} s an action",
+        f"{timing['steps_per_wall_second']:.0f} steps/s",
+    )
+    return table

@@ -1,0 +1,59 @@
+import json
+
+from atg_fg.presets import preset
+
+
+def test_reliability_prints_rates_and_writes_them(run, tmp_path):
+    file = tmp_path / "reliability.json"
+    status, output, error = run("sim", "reliability", "--actions", 2, "--jobs", 1, "--json", file)
+    assert (status, error) == (0, "")
+    assert "nominal: 2 random actions, seed 0" in output
+    document = json.loads(file.read_text())
+    assert document["command"] == "sim reliability"
+    assert document["parameters"] == {"condition": "nominal", "actions": 2, "seed": 0}
+    assert document["success"]["of"] == 2
+    assert len(document["success"]["interval95"]) == 2
+    assert set(document["by_action"]) == {"flip", "left", "right"}
+    preset_file = tmp_path / "mine.json"
+    status, output, error = run("sim", "calibrate", file, "--output", preset_file)
+    assert (status, error) == (0, "")
+    assert "transition_concentration" in output
+    assert preset(str(preset_file)).transition_concentration > 0
+    assert json.loads(preset_file.read_text())["command"] == f"atg-fg sim calibrate {file}"
+
+
+def test_json_alone_goes_to_standard_output(run):
+    status, output, _ = run("sim", "reliability", "--actions", 1, "--jobs", 1, "--json", "-")
+    assert status == 0
+    assert json.loads(output)["success"]["of"] == 1
+
+
+def test_pictures_and_a_film_are_written(run, tmp_path):
+    picture, film = tmp_path / "robot.png", tmp_path / "robot.gif"
+    status, _, error = run("sim", "picture", "--output", picture, "--film", film)
+    assert (status, error) == (0, "")
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert film.read_bytes().startswith(b"GIF89a")
+
+
+def test_bad_options_are_refused(refused, tmp_path):
+    assert "condition: unknown name 'new'" in refused("sim", "reliability", "--condition", "new")
+    assert "--actions: 0" in refused("sim", "reliability", "--actions", 0)
+    assert "--jobs: 0" in refused("sim", "reliability", "--jobs", 0)
+    assert "nowhere.urdf" in refused("sim", "reliability", "--urdf", "nowhere.urdf", "--actions", 1, "--jobs", 1)
+    assert "nowhere.json" in refused("sim", "calibrate", "nowhere.json")
+    assert "cannot be written" in refused("sim", "reliability", "--json", tmp_path / "none" / "file.json")
+    assert "suffix" in refused("sim", "picture", "--output", tmp_path / "robot.txt")
+
+
+def test_a_table_on_the_robot_is_recorded_and_gone_on_with(run, refused, tmp_path):
+    arguments = ["table1", "--world", "robonaut", "--engine", "bayes-filter", "--tests", 1, "--actions", 1]
+    arguments += ["--jobs", 1, "--condition", "worn", "--records", tmp_path, "--json", "-"]
+    status, whole, _ = run(*arguments, "--trials", 2)
+    assert status == 0
+    assert json.loads(whole)["parameters"]["condition"] == "worn"
+    assert "already there" in refused(*arguments, "--trials", 2)
+    status, again, _ = run(*arguments, "--trials", 2, "--resume")
+    assert (status, again) == (0, whole)
+    assert "--resume: no records" in refused("table1", "--resume")
+    assert "cannot be made" in refused("table1", "--condition", "worn", "--jobs", 1)
