@@ -138,7 +138,9 @@ def _open_log(plan: TestPlan, seed: int, records: Path | None, memory: RobotMemo
     if records is None:
         return None
     make_folder(records)
-    header = {"seed": seed, **asdict(plan)}
+    # What is as usual is left out, so that a plan may get more to say and old records still be gone on with.
+    usual = asdict(TestPlan())
+    header = {"seed": seed, **{name: value for name, value in asdict(plan).items() if value != usual[name]}}
     return TrialLog(records / f"test-{seed:04}.jsonl.gz", header, memory.assumptions)
 
 
@@ -164,7 +166,7 @@ class _Score:
     def add(self, outcome: TrialOutcome, learned: str | None) -> None:
         """Score a trial whose record went to the ATG named ``learned``.
 
-        A trial without a verdict is no success. An object of which nothing was learned counts as not met.
+        A trial without a verdict is no success, but its object was met.
         """
         self.n_trials += 1
         self.lost += outcome.verdict == "lost"
@@ -176,10 +178,9 @@ class _Score:
         self.judged_known += seen_before and identified
         self.recognised += seen_before and identified and right_match
         self.successes += identified and (right_match or not seen_before)
-        if learned is not None:
-            self._presented.add(outcome.object)
-            if outcome.verdict == "novel":
-                self._made_from[learned] = outcome.object
+        self._presented.add(outcome.object)
+        if learned is not None and outcome.verdict == "novel":
+            self._made_from[learned] = outcome.object
 
     def result(self, seed: int) -> TestResult:
         """Return the scores of the test with this seed."""
