@@ -22,8 +22,8 @@ def sources(notebook):
     return [(cell.cell_type, cell.source) for cell in notebook.cells]
 
 
-def test_there_are_the_three_notebooks_in_reading_order():
-    assert [path.stem[:2] for path in NOTEBOOKS] == ["01", "02", "03"]
+def test_there_are_these_notebooks_in_reading_order():
+    assert [path.stem[:2] for path in NOTEBOOKS] == ["01", "02", "03", "07"]
 
 
 # A kernel's sockets are closed by its own threads, some time after the test; that is none of this project's.

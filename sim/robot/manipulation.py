@@ -35,7 +35,7 @@ class Manipulator:
     Args:
         controller: Of the arms.
         look: Returns where the cube is seen to stand; the only thing known about it.
-        on_phase: Called with the name of each phase as it begins.
+        on_phase: Called with the name of each phase of a plan as it begins.
 
     Attributes:
         squarings: How often the cube had to be squared up.
