@@ -6,7 +6,7 @@ The same file gives the same posterior in every exact engine; the format is in `
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, Protocol
 
 from atg_fg.engines import begin_trial
 from atg_fg.engines.base import Inference
@@ -28,6 +28,13 @@ from atg_fg.policies import best_actions
 SCRIPT_FORMAT: Final = "atg-fg/scripted-trial"
 _KEYS = ("format", "version", "assumptions", "parameters", "memory", "steps")
 _PARAMETERS = ("transition_concentration", "observation_noise", "learn_in_trial")
+
+
+class OnStep(Protocol):
+    """Called after each step of a script."""
+
+    def __call__(self, inference: Inference, *, observed: bool) -> None:
+        """Take note of a look (``observed``) or of an action."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,8 +101,31 @@ def replay(script: ScriptedTrial, engine: str, *, smooth: bool = False) -> dict[
         InvalidInputError: Evidence of probability zero; the message names the step.
         TooLargeError: More than the engine can do.
     """
+    steps: list[dict[str, Any]] = []
+
+    def enter(inference: Inference, *, observed: bool) -> None:
+        steps.append(_entry(len(steps), inference, observed=observed))
+
+    inference = run_script(script, engine, enter)
+    document: dict[str, Any] = {"engine": engine, "steps": steps}
+    if smooth:
+        document["smoothed"] = smoothed(inference)
+    return document
+
+
+def run_script(script: ScriptedTrial, engine: str, on_step: OnStep | None = None) -> Inference:
+    """Return an engine that has gone through the whole script.
+
+    Args:
+        script: The scripted trial.
+        engine: Name of the engine.
+        on_step: Called with the engine after each step.
+
+    Raises:
+        InvalidInputError: Evidence of probability zero; the message names the step.
+        TooLargeError: More than the engine can do.
+    """
     inference = begin_trial(engine, script.memory, script.parameters)
-    steps = []
     for number, step in enumerate(script.steps):
         try:
             if isinstance(step, Evidence):
@@ -107,11 +137,9 @@ def replay(script: ScriptedTrial, engine: str, *, smooth: bool = False) -> dict[
                 f"{script.place}: steps[{number}]: the evidence has probability zero under the model; "
                 "expected evidence that some object could give, or noise above 0"
             ) from error
-        steps.append(_entry(number, inference, observed=isinstance(step, Evidence)))
-    document: dict[str, Any] = {"engine": engine, "steps": steps}
-    if smooth:
-        document["smoothed"] = _smoothed(inference)
-    return document
+        if on_step is not None:
+            on_step(inference, observed=isinstance(step, Evidence))
+    return inference
 
 
 def _entry(number: int, inference: Inference, *, observed: bool) -> dict[str, Any]:
@@ -132,7 +160,7 @@ def _entry(number: int, inference: Inference, *, observed: bool) -> dict[str, An
     return entry
 
 
-def _smoothed(inference: Inference) -> dict[str, Any]:
+def smoothed(inference: Inference) -> dict[str, Any]:
     """Return p(X_t | all evidence) of every look under the most probable remembered object.
 
     Where no remembered object is possible it is that under *unseen*, and the object is null.

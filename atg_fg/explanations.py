@@ -1,0 +1,153 @@
+"""What a trial's factor graph gives beyond a filter: explanations (O, X_0, …, X_t), samples of them, and surprise.
+
+All work on a ``Chain``, so any exact engine can be asked: ``best_explanations(inference.chain(), 5)``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from atg_fg.chain import Chain
+from atg_fg.errors import ImpossibleEvidenceError, InvalidInputError
+from atg_fg.patterns import FloatArray, IntArray
+
+
+@dataclass(frozen=True)
+class Explanation:
+    """One way in which all that was seen can have come about.
+
+    Attributes:
+        hypothesis: State of O; the last one is *unseen*.
+        states: State of X_s at every time s; 0 is the collection node, 1 + k the k-th known aspect.
+        log_probability: ln p(O, X_0:t | z_0:t, a_1:t).
+    """
+
+    hypothesis: int
+    states: tuple[int, ...]
+    log_probability: float
+
+    @property
+    def probability(self) -> float:
+        """p(O, X_0:t | z_0:t, a_1:t)."""
+        return float(np.exp(self.log_probability))
+
+
+def best_explanations(chain: Chain, k: int = 1) -> list[Explanation]:
+    """Return the k most probable explanations, best first; the first is the MPE. Fewer if fewer are possible.
+
+    A Viterbi recursion that keeps, for every object and last aspect, the k best ways there.
+
+    Raises:
+        InvalidInputError: k below one.
+        ImpossibleEvidenceError: The evidence has probability zero.
+    """
+    if k < 1:
+        raise InvalidInputError(f"k: {k}; expected a whole number of at least 1")
+    likelihoods = _likelihoods(chain)
+    log_evidence = float(surprise(chain).sum()) * -1.0
+    #: ln p of the r-th best way to each state, shape [H, W, r], and where it came from, flat over (state, rank)
+    scores = (_log(chain.prior)[:, None] + _log(chain.initial) + _log(likelihoods[0]))[:, :, None]
+    origins: list[IntArray] = []
+    for transition, likelihood in zip(chain.transitions, likelihoods[1:], strict=True):
+        ways = scores[:, :, :, None] + _log(transition)[:, :, None, :]
+        ways = ways.reshape(len(ways), -1, transition.shape[2])
+        best = np.argsort(-ways, axis=1, kind="stable")[:, :k]
+        origins.append(best.transpose(0, 2, 1))
+        scores = np.take_along_axis(ways, best, axis=1).transpose(0, 2, 1) + _log(likelihood)[:, :, None]
+    order = np.argsort(-scores, axis=None, kind="stable")[:k]
+    found = []
+    for flat in order:
+        hypothesis, state, rank = (int(index) for index in np.unravel_index(flat, scores.shape))
+        log_joint = float(scores[hypothesis, state, rank])
+        if np.isfinite(log_joint):
+            states = _traced(origins, hypothesis, state, rank, k)
+            found.append(Explanation(hypothesis, states, log_joint - log_evidence))
+    return found
+
+
+def _traced(origins: list[IntArray], hypothesis: int, state: int, rank: int, k: int) -> tuple[int, ...]:
+    """Follow the origins back from a last state."""
+    states = [state]
+    for time in range(len(origins) - 1, -1, -1):
+        # Ranks before time 1 are one a state; later ones are as many as were kept.
+        ranks = 1 if time == 0 else origins[time - 1].shape[2]
+        state, rank = divmod(int(origins[time][hypothesis, state, rank]), ranks)
+        states.append(state)
+    return tuple(reversed(states))
+
+
+def sample_explanations(chain: Chain, n: int, rng: np.random.Generator) -> list[Explanation]:
+    """Return n explanations drawn from p(O, X_0:t | z_0:t, a_1:t), by filtering forward and sampling backward.
+
+    Raises:
+        InvalidInputError: n below one.
+        ImpossibleEvidenceError: The evidence has probability zero.
+    """
+    if n < 1:
+        raise InvalidInputError(f"n: {n}; expected a whole number of at least 1")
+    filtered, log_joint = _forward(chain)
+    log_weights = log_joint[-1]
+    log_identity = log_weights - _log_sum(log_weights)
+    hypotheses = rng.choice(len(log_identity), size=n, p=np.exp(log_identity) / np.exp(log_identity).sum())
+    drawn = []
+    for hypothesis in hypotheses:
+        states = [int(rng.choice(chain.widths[-1], p=filtered[-1][hypothesis]))]
+        log_probability = float(log_identity[hypothesis] + np.log(filtered[-1][hypothesis, states[0]]))
+        for time in range(len(chain.transitions) - 1, -1, -1):
+            weights = filtered[time][hypothesis] * chain.transitions[time][hypothesis, :, states[-1]]
+            weights = weights / weights.sum()
+            states.append(int(rng.choice(len(weights), p=weights)))
+            log_probability += float(np.log(weights[states[-1]]))
+        drawn.append(Explanation(int(hypothesis), tuple(reversed(states)), log_probability))
+    return drawn
+
+
+def surprise(chain: Chain) -> FloatArray:
+    """Return −ln p(z_s | z_0:s-1, a_1:s) of every look, shape [looks], in nats; they sum to −ln p(z_0:t | a_1:t).
+
+    Raises:
+        ImpossibleEvidenceError: The evidence has probability zero.
+    """
+    _, log_joint = _forward(chain)
+    log_evidence = np.array([_log_sum(weights) for weights in log_joint[: len(chain.likelihoods)]])
+    return -np.diff(log_evidence, prepend=0.0)
+
+
+def _forward(chain: Chain) -> tuple[list[FloatArray], list[FloatArray]]:
+    """Return p(X_s | O, z_0:s), shape [H, W_s], and ln p(O, z_0:s), shape [H], of every time s."""
+    predicted, log_weights = chain.initial, _log(chain.prior)
+    filtered: list[FloatArray] = []
+    log_joint: list[FloatArray] = []
+    for time, likelihood in enumerate(_likelihoods(chain)):
+        if time:
+            predicted = np.einsum("hx,hxy->hy", filtered[-1], chain.transitions[time - 1])
+        joint = predicted * likelihood
+        total = joint.sum(axis=1)
+        possible = total > 0
+        log_weights = log_weights + _log(total)
+        filtered.append(np.where(possible[:, None], joint / np.where(possible, total, 1.0)[:, None], predicted))
+        log_joint.append(log_weights)
+        if not np.isfinite(log_weights).any():
+            raise ImpossibleEvidenceError(
+                f"observation {time}: the evidence has probability zero under the model; "
+                "expected evidence that some object could give, or noise above 0"
+            )
+    return filtered, log_joint
+
+
+def _likelihoods(chain: Chain) -> list[FloatArray]:
+    """Return p(z_s | X_s, O) for every time, ones where nothing was seen yet."""
+    unseen_yet = [np.ones((len(chain.prior), width)) for width in chain.widths[len(chain.likelihoods) :]]
+    return [*chain.likelihoods, *unseen_yet]
+
+
+def _log(values: FloatArray) -> FloatArray:
+    return np.log(values, out=np.full_like(values, -np.inf), where=values > 0)
+
+
+def _log_sum(logarithms: FloatArray) -> float:
+    """Return ln Σ exp."""
+    greatest = float(logarithms.max())
+    return greatest + float(np.log(np.exp(logarithms - greatest).sum())) if np.isfinite(greatest) else greatest
