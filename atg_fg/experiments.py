@@ -16,10 +16,12 @@ import numpy as np
 from atg_fg.arcube import make_arcubes
 from atg_fg.assumptions import arcube_assumptions
 from atg_fg.engines import ENGINES, begin_trial
+from atg_fg.engines.base import Inference
 from atg_fg.errors import InvalidInputError, unknown_name
 from atg_fg.memory import RobotMemory
 from atg_fg.parameters import ModelParameters
 from atg_fg.policies import make_policy
+from atg_fg.smoothed_learning import smoothed_patterns
 from atg_fg.statistics import mean, standard_error, wilson_interval
 from atg_fg.store import make_folder
 from atg_fg.trial import TrialRecord, run_trial
@@ -37,6 +39,8 @@ class TestPlan:
         engine: Name of the inference engine.
         policy: Name of the policy.
         parameters: α, δ and whether to learn within the trial.
+        smoothed_learning: Whether the memory learns the patterns that are probable given all evidence of a trial,
+            rather than those that were seen whole.
         n_actions: Actions a trial.
         n_trials: Trials a test.
         n_objects: |O|.
@@ -49,6 +53,7 @@ class TestPlan:
     engine: str = "gtsam"
     policy: str = "entropy"
     parameters: ModelParameters = field(default_factory=ModelParameters)
+    smoothed_learning: bool = False
     n_actions: int = 10
     n_trials: int = 100
     n_objects: int = 100
@@ -125,10 +130,11 @@ def run_test(
             inference = begin_trial(plan.engine, memory, plan.parameters)
             rng = np.random.default_rng(trial_seeds[number])
             record = run_trial(world, inference, policy, plan.n_actions, rng)
-            outcome = TrialOutcome.of(record)
+            smoothed = _smoothed(inference, record) if plan.smoothed_learning else None
+            outcome = TrialOutcome.of(record, smoothed)
             score.add(outcome, learn_from(outcome, memory))
             if log is not None:
-                log.append(record)
+                log.append(record, outcome)
             if on_trial is not None:
                 on_trial(number, record)
     return score.result(seed)
@@ -142,6 +148,14 @@ def _open_log(plan: TestPlan, seed: int, records: Path | None, memory: RobotMemo
     usual = asdict(TestPlan())
     header = {"seed": seed, **{name: value for name, value in asdict(plan).items() if value != usual[name]}}
     return TrialLog(records / f"test-{seed:04}.jsonl.gz", header, memory.assumptions)
+
+
+def _smoothed(inference: Inference, record: TrialRecord) -> list[int | None] | None:
+    """Return the patterns that are probable given all evidence and the verdict, ``None`` if there is no verdict."""
+    if record.verdict not in ("known", "novel"):
+        return None
+    names = record.names
+    return smoothed_patterns(inference, len(names) if record.matched is None else names.index(record.matched))
 
 
 def learn_from(record: TrialRecord | TrialOutcome, memory: RobotMemory) -> str | None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 import gzip
 import json
 import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -32,7 +32,7 @@ class TrialOutcome:
     Attributes:
         verdict: How it ended.
         matched: Name of the ATG the object was matched to.
-        patterns: Index of the pattern at each look, ``None`` where it was not complete.
+        patterns: Index of the pattern to learn from at each look, ``None`` where it was not complete.
         actions: Index of each action.
         object: What was presented, by the world's truth.
     """
@@ -44,10 +44,11 @@ class TrialOutcome:
     object: object
 
     @classmethod
-    def of(cls, record: TrialRecord) -> TrialOutcome:
-        """Return the outcome of a trial that has just been run."""
+    def of(cls, record: TrialRecord, patterns: Sequence[int | None] | None = None) -> TrialOutcome:
+        """Return the outcome of a trial that has just been run, with ``patterns`` in place of those seen if given."""
         truth = record.steps[0].truth["object"]
-        return cls(record.verdict, record.matched, tuple(record.patterns), tuple(record.actions), truth)
+        seen = record.patterns if patterns is None else patterns
+        return cls(record.verdict, record.matched, tuple(seen), tuple(record.actions), truth)
 
 
 class TrialLog:
@@ -92,10 +93,13 @@ class TrialLog:
             file.truncate(sound)
         return [self._outcome(line) for line in lines[1:]]
 
-    def append(self, record: TrialRecord) -> None:
-        """Add a trial to the file."""
+    def append(self, record: TrialRecord, outcome: TrialOutcome | None = None) -> None:
+        """Add a trial to the file, and what is learned from it if that is not what was seen."""
+        line = self._line(record)
+        if outcome is not None and outcome.patterns != tuple(record.patterns):
+            line["learned"] = outcome.patterns
         with self.path.open("ab") as file:
-            file.write(_member(self._line(record)))
+            file.write(_member(line))
 
     def _line(self, record: TrialRecord) -> dict[str, Any]:
         truths = [step.truth for step in record.steps]
@@ -116,7 +120,7 @@ class TrialLog:
             return TrialOutcome(
                 line["verdict"],
                 line["matched"],
-                tuple(Evidence.of_detection(alphabet, detection).pattern for detection in seen),
+                tuple(line.get("learned", [Evidence.of_detection(alphabet, each).pattern for each in seen])),
                 tuple(names.index(action) for action in line["actions"]),
                 line["truth"][0]["object"],
             )

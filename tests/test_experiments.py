@@ -7,6 +7,7 @@ from atg_fg.errors import InvalidInputError, UnknownNameError
 from atg_fg.experiments import TestPlan, TestResult, figure3_points, run_test, run_tests, summarise
 from atg_fg.parameters import ModelParameters
 from atg_fg.presets import preset
+from atg_fg.trial_log import read_trials
 
 QUICK = TestPlan(engine="bayes-filter", n_trials=30, n_actions=6)
 
@@ -154,3 +155,32 @@ def test_trials_without_a_verdict_are_counted_and_are_no_success():
     assert (result.identification, result.success, result.undecided, result.lost) == ((0, 5), (0, 5), 5, 0)
     summary = summarise([result])
     assert (summary["undecided"], summary["lost"], summary["tests"][0]["undecided"]) == (5, 0, 5)
+
+
+class TestSmoothedLearning:
+    # Few objects, often met: what was seen in part one time is known from another.
+    PLAN = TestPlan(
+        engine="bayes-filter",
+        smoothed_learning=True,
+        world_options={"missing": 0.2},
+        n_objects=2,
+        n_trials=12,
+        n_actions=12,
+    )
+
+    def test_it_is_the_same_after_an_interruption(self, tmp_path):
+        whole = run_test(self.PLAN, 1, tmp_path)
+        assert run_test(self.PLAN, 1, tmp_path, True) == whole == run_test(self.PLAN, 1)
+
+    def test_it_fills_in_what_was_seen_in_part(self, tmp_path):
+        run_test(self.PLAN, 1, tmp_path)
+        trials = read_trials(tmp_path / "test-0001.jsonl.gz")
+        filled = [trial for trial in trials if "learned" in trial]
+        assert filled
+        for trial in filled:
+            seen_whole = sum(None not in seen for seen in trial["observed"])
+            assert sum(pattern is not None for pattern in trial["learned"]) > seen_whole
+
+    def test_where_everything_is_seen_it_changes_nothing(self):
+        plan = replace(self.PLAN, world_options={})
+        assert run_test(plan, 1) == run_test(replace(plan, smoothed_learning=False), 1)

@@ -39,6 +39,9 @@ def table1(
     urdf: options.Urdf = None,
     jobs: options.Jobs = None,
     records: Annotated[Path | None, typer.Option(help="Folder in which every trial is saved as it ends.")] = None,
+    smoothed_learning: Annotated[
+        bool, typer.Option("--smoothed-learning", help="Learn what is probable given all evidence of a trial.")
+    ] = False,
     resume: Annotated[bool, typer.Option("--resume", help="Go on after the trials that --records holds.")] = False,
     json_file: options.JsonFile = None,
 ) -> None:
@@ -58,6 +61,7 @@ def table1(
         engine=engine,
         policy=policy,
         parameters=preset_named(preset),
+        smoothed_learning=smoothed_learning,
         n_actions=actions,
         n_trials=trials,
     )
@@ -81,6 +85,7 @@ def table1(
         "wrong": wrong,
         "missing": missing,
         **world_options,
+        **({"smoothed_learning": True} if smoothed_learning else {}),
     }
     options.write_json({"command": "table1", "parameters": parameters, **summary}, json_file)
     if json_file != "-":
