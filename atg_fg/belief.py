@@ -14,6 +14,12 @@ def x_log_x(x: FloatArray) -> FloatArray:
     return x * np.log(x, out=np.zeros_like(x), where=x > 0)
 
 
+def log_sum_exp(logarithms: FloatArray) -> float:
+    """Return ln Σ exp of logarithms, of which −∞ stands for zero."""
+    peak = float(logarithms.max())
+    return peak + float(np.log(np.exp(logarithms - peak).sum())) if np.isfinite(peak) else peak
+
+
 @dataclass(frozen=True, eq=False)
 class IdentityBelief:
     """p(O | z, a), normalised.

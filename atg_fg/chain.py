@@ -7,7 +7,8 @@ belief, so the chain of a trial can be made again at any time from what was done
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -78,6 +79,15 @@ class Chain:
             tuple(table[[hypothesis]] for table in self.likelihoods),
         )
 
+    def scaled(self) -> tuple[Chain, float]:
+        """Return the chain with every likelihood divided by its greatest value, and the sum of their logarithms.
+
+        So evidence on any scale stays within the range of floats. A likelihood that is zero throughout is kept.
+        """
+        greatest = [float(table.max()) or 1.0 for table in self.likelihoods]
+        likelihoods = tuple(table / scale for table, scale in zip(self.likelihoods, greatest, strict=True))
+        return replace(self, likelihoods=likelihoods), float(np.log(greatest).sum())
+
 
 def build_chain(
     memory: RobotMemory,
@@ -110,3 +120,31 @@ def build_chain(
     if history.awaits_evidence:
         incoming.append(model.transition(history.actions[-1])[chosen])
     return Chain(model.prior[chosen], incoming[0], tuple(incoming[1:]), tuple(likelihoods))
+
+
+class ForwardPass(NamedTuple):
+    """The Bayes filter of a whole chain, one object at a time, as logarithms where numbers may be small.
+
+    Attributes:
+        log_joint: ln p(O, z_0:t | a_1:t), −∞ where an object is ruled out, shape [H].
+        filtered: p(X_s | O, z_0:s, a_1:s) for every time s, each of shape [H, W_s]; zero where an object is ruled out.
+    """
+
+    log_joint: FloatArray
+    filtered: tuple[FloatArray, ...]
+
+
+def forward_pass(chain: Chain) -> ForwardPass:
+    """Return the forward pass of a chain."""
+    log_joint = np.log(chain.prior)
+    filtered: list[FloatArray] = []
+    predicted = chain.initial
+    for time in range(len(chain.widths)):
+        if time:
+            predicted = np.matmul(filtered[-1][:, None, :], chain.transitions[time - 1])[:, 0, :]
+        joint = predicted * chain.likelihoods[time] if time < len(chain.likelihoods) else predicted
+        total = joint.sum(axis=1)
+        possible = total > 0
+        log_joint = log_joint + np.log(total, out=np.full_like(total, -np.inf), where=possible)
+        filtered.append(joint / np.where(possible, total, 1.0)[:, None])
+    return ForwardPass(log_joint, tuple(filtered))

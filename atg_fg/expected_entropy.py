@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from atg_fg.belief import x_log_x
-from atg_fg.model import RecognitionModel
+from atg_fg.model import COLLECTION, RecognitionModel
 from atg_fg.patterns import FloatArray, IntArray
 
 
@@ -66,3 +66,36 @@ def expected_entropies(model: RecognitionModel, joint: NextPatternJoint, unseen:
     )
     entropies: FloatArray = x_log_x(predictive).sum(axis=1) - joint_terms + unseen * np.log(model.n_unseen)
     return np.maximum(entropies, 0.0)
+
+
+def edge_arrivals(model: RecognitionModel, mass: FloatArray) -> FloatArray:
+    """Return the part of ``mass`` [H, W] that counted edges carry to each state under each action, [A, H, W]."""
+    edges = model.edges
+    shape = (model.n_actions, model.n_hypotheses, model.n_states)
+    carried = mass[edges.hypothesis, edges.source] * model.edge_probability
+    arrivals = np.bincount(model.edge_cells, weights=carried, minlength=int(np.prod(shape)))
+    return arrivals.astype(np.float64).reshape(shape)
+
+
+def expected_entropies_of(model: RecognitionModel, mass: FloatArray) -> FloatArray:
+    """Return eq. 3 for each action in nats, shape [A], from a belief over object and present aspect.
+
+    Args:
+        model: The tables in force.
+        mass: p(O, X_t | z_0:t), or an approximation of it that sums to one, shape [H, W].
+    """
+    observed = 1.0 - model.parameters.observation_noise
+    total = mass.sum(axis=1)
+    noise = model.parameters.observation_noise / model.n_patterns * total
+    kept = np.einsum("hx,ahx->ah", mass, model.stay)
+    unreached = kept * (observed / model.n_aspects) + noise
+    arrivals = edge_arrivals(model, mass)
+    reached = np.flatnonzero(arrivals)
+    targets = Targets(*np.unravel_index(reached, arrivals.shape))
+    joint = NextPatternJoint(
+        unknown=kept * model.base[:, COLLECTION] * model.unknown_rate + noise,
+        unreached=unreached,
+        targets=targets,
+        reached=unreached[targets.action, targets.hypothesis] + observed * arrivals.ravel()[reached],
+    )
+    return expected_entropies(model, joint, float(total[-1]))

@@ -2,13 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 from atg_fg.assumptions import Assumptions
-from atg_fg.engines import begin_trial
+from atg_fg.engines import ENGINES, begin_trial
 from atg_fg.engines.base import Inference
 from atg_fg.graph import AspectTransitionGraph
 from atg_fg.memory import RobotMemory
 from atg_fg.parameters import ModelParameters
 from atg_fg.patterns import Evidence, PatternAlphabet
+
+EXACT_ENGINES = [name for name, engine in ENGINES.items() if engine.exact]
+APPROXIMATE_ENGINES = [name for name, engine in ENGINES.items() if not engine.exact]
 
 
 def one_slot(n_objects: int, n_aspects: int, n_symbols: int, actions: tuple[str, ...] = ("push",)) -> Assumptions:
@@ -32,9 +38,15 @@ def seen(assumptions: Assumptions, *symbols: int | None) -> Evidence:
     return Evidence.of_detection(assumptions.alphabet, symbols)
 
 
-def trial(engine: str, memory: RobotMemory, parameters: ModelParameters, *steps: int) -> Inference:
+def trial(
+    engine: str,
+    memory: RobotMemory,
+    parameters: ModelParameters,
+    *steps: int,
+    options: Mapping[str, Any] | None = None,
+) -> Inference:
     """A trial in a world of one slot: symbol, action, symbol, action, …"""
-    inference = begin_trial(engine, memory, parameters)
+    inference = begin_trial(engine, memory, parameters, **(options or {}))
     for number, step in enumerate(steps):
         if number % 2:
             inference.act(step)

@@ -1,4 +1,4 @@
-"""Posteriors of tiny trials by hand; every engine has to give them."""
+"""Posteriors of tiny trials by hand; every exact engine has to give them."""
 
 from math import log
 
@@ -6,15 +6,14 @@ import numpy as np
 import pytest
 
 from atg_fg.belief import IdentityBelief
-from atg_fg.engines import ENGINES
 from atg_fg.errors import ImpossibleEvidenceError
 from atg_fg.memory import RobotMemory
 from atg_fg.parameters import ModelParameters
-from tests.small import graph, one_slot, seen, trial
+from tests.small import EXACT_ENGINES, graph, one_slot, seen, trial
 
 EXACT = ModelParameters(0.0, 0.0, learn_in_trial=False)
 EXACT_LEARNING = ModelParameters(0.0, 0.0, learn_in_trial=True)
-every_engine = pytest.mark.parametrize("engine", ENGINES)
+every_exact_engine = pytest.mark.parametrize("engine", EXACT_ENGINES)
 
 
 def one_known_aspect() -> RobotMemory:
@@ -27,7 +26,7 @@ def close(expected: float) -> object:
     return pytest.approx(expected, rel=0, abs=1e-14)
 
 
-@every_engine
+@every_exact_engine
 def test_one_look_by_hand(engine: str) -> None:
     # A: 1/3 prior · (1/2 its aspect · 1 + 1/2 C · 0) = 1/6 = 3/18.  unseen: 2/3 · 1/3 = 2/9 = 4/18.
     inference = trial(engine, one_known_aspect(), EXACT, 0)
@@ -39,7 +38,7 @@ def test_one_look_by_hand(engine: str) -> None:
     assert belief.entropy == close(-3 / 7 * log(3 / 7) - 2 * 2 / 7 * log(2 / 7))
 
 
-@every_engine
+@every_exact_engine
 def test_expected_entropy_by_hand(engine: str) -> None:
     # After pattern 0 as above (A 3/7, unseen 4/7). Push was never tried, so A shows 0 with 1/2, and 1 or 2 with 1/4;
     # unseen shows each with 1/3.
@@ -52,7 +51,7 @@ def test_expected_entropy_by_hand(engine: str) -> None:
     assert inference.expected_entropies().tolist() == [close(expected)]
 
 
-@every_engine
+@every_exact_engine
 def test_another_look_by_hand(engine: str) -> None:
     # Joint with z = 1 as above: A 9/84, unseen 16/84; of all 7/18 · 25/84.
     inference = trial(engine, one_known_aspect(), EXACT, 0, 0, 1)
@@ -61,7 +60,7 @@ def test_another_look_by_hand(engine: str) -> None:
     assert inference.log_evidence == close(log(7 / 18 * 25 / 84))
 
 
-@every_engine
+@every_exact_engine
 def test_learning_within_the_trial_by_hand(engine: str) -> None:
     # Look 0: A 3/7, unseen 4/7 as above, but now unseen knows an aspect that shows 0, just as A does.
     # Push, look 1: from an untried aspect both give 1/2 to C, and C 1/2 to each pattern left: 1/4. No change.
@@ -81,7 +80,7 @@ def test_learning_within_the_trial_by_hand(engine: str) -> None:
     assert inference.expected_entropies().tolist() == [close(inference.identity().entropy)]
 
 
-@every_engine
+@every_exact_engine
 def test_belief_in_the_collection_node_is_divided_by_hand(engine: str) -> None:
     # |𝒵| = 2, G = 2, δ = 1/2, nothing remembered. Look 0: C shows it by (1/2)/2, or by noise (1/2)/2: half and half.
     # Push was not tried, so X_1 is the new node or C, 1/2 each. Look 0 again: the node shows it with 1/2 + 1/4, and C,
@@ -109,7 +108,7 @@ def test_belief_in_the_collection_node_is_divided_by_hand(engine: str) -> None:
     assert inference.log_evidence == close(log(1 / 4 * 10 / 32))
 
 
-@every_engine
+@every_exact_engine
 def test_an_action_tells_objects_apart_that_look_the_same_by_hand(engine: str) -> None:
     # A and B show the same two patterns; push swaps them on A and keeps them on B. G = 2, N = 2, U = 1, |𝒵| = 2.
     # Look 0: A and B 1/3 · 1/2, unseen 1/3 · 1/2: 1/3 each.  Push, look 0: A 0, B 1, unseen 1/2.
@@ -133,7 +132,7 @@ def test_an_action_tells_objects_apart_that_look_the_same_by_hand(engine: str) -
     assert not inference.identity().is_novel
 
 
-@every_engine
+@every_exact_engine
 def test_what_no_object_can_show_is_refused_and_the_trial_goes_on(engine: str) -> None:
     # G = 1: after pattern 0 the one aspect of unseen is known, and without noise pattern 1 cannot be.
     memory = RobotMemory(one_slot(1, 1, 2))

@@ -8,7 +8,7 @@ from importlib.metadata import entry_points
 import typer
 import typer.exceptions
 
-from atg_fg.cli import demo, experiments, memory, trials
+from atg_fg.cli import demo, engines, experiments, explain, memory, trials
 from atg_fg.errors import AtgError
 
 app = typer.Typer(
@@ -23,6 +23,9 @@ app.command()(experiments.table1)
 app.command()(experiments.figure3)
 app.command()(trials.trial)
 app.command()(trials.replay)
+app.command()(explain.explain)
+app.command()(engines.compare)
+app.command()(engines.calibrate)
 app.add_typer(memory.app, name="memory")
 # Packages beside this one, such as ``sim``, add groups of commands by an entry point.
 for group in entry_points(group="atg_fg.commands"):

@@ -2,27 +2,55 @@
 
 from __future__ import annotations
 
-from typing import Final
+from collections.abc import Callable
+from typing import Any, Final
 
 from atg_fg.engines.base import Inference
 from atg_fg.engines.bayes_filter import BayesFilter
 from atg_fg.engines.enumeration import Enumeration
+from atg_fg.engines.gibbs_sampling import GibbsSampling
 from atg_fg.engines.gtsam_elimination import GtsamElimination
+from atg_fg.engines.gtsam_routes import GtsamMarginals, GtsamMultifrontal, GtsamSequential
+from atg_fg.engines.loopy_belief_propagation import LoopyBeliefPropagation
+from atg_fg.engines.mean_field import MeanField
+from atg_fg.engines.options import check_known
+from atg_fg.engines.particle_filter import ParticleFilter
 from atg_fg.errors import unknown_name
 from atg_fg.memory import RobotMemory
 from atg_fg.parameters import ModelParameters
 
 ENGINES: Final[dict[str, type[Inference]]] = {
-    engine.name: engine for engine in (GtsamElimination, BayesFilter, Enumeration)
+    engine.name: engine
+    for engine in (
+        GtsamElimination,
+        BayesFilter,
+        Enumeration,
+        GtsamSequential,
+        GtsamMultifrontal,
+        GtsamMarginals,
+        LoopyBeliefPropagation,
+        ParticleFilter,
+        GibbsSampling,
+        MeanField,
+    )
 }
 
 
-def begin_trial(engine: str, memory: RobotMemory, parameters: ModelParameters) -> Inference:
+def begin_trial(engine: str, memory: RobotMemory, parameters: ModelParameters, **options: Any) -> Inference:
     """Return the engine named ``engine`` at the beginning of a trial.
+
+    Args:
+        engine: A name in ``ENGINES``.
+        memory: The robot memory when the trial begins; it is not changed.
+        parameters: α, δ and whether to learn within the trial.
+        **options: The engine's own keyword options; each has a default.
 
     Raises:
         UnknownNameError: No engine has this name.
+        InvalidInputError: The engine has no such option, or it does not take this value.
     """
     if engine not in ENGINES:
         raise unknown_name("engine", engine, ENGINES)
-    return ENGINES[engine](memory, parameters)
+    check_known(ENGINES[engine], engine, options)
+    begin: Callable[..., Inference] = ENGINES[engine]
+    return begin(memory, parameters, **options)

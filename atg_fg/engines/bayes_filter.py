@@ -12,8 +12,7 @@ import numpy as np
 
 from atg_fg.chain import Chain
 from atg_fg.engines.base import FilterInference
-from atg_fg.expected_entropy import NextPatternJoint, Targets, expected_entropies
-from atg_fg.model import COLLECTION
+from atg_fg.expected_entropy import edge_arrivals, expected_entropies_of
 from atg_fg.patterns import FloatArray
 
 
@@ -26,39 +25,15 @@ class BayesFilter(FilterInference):
     def _propagate(self, aspects: FloatArray, action: int) -> FloatArray:
         model = self.model
         kept = (aspects * model.stay[action]).sum(axis=1)
-        predicted: FloatArray = kept[:, None] * model.base + self._arrivals(aspects)[action]
+        predicted: FloatArray = kept[:, None] * model.base + edge_arrivals(model, aspects)[action]
         return predicted
 
     def _correct(self, aspects: FloatArray, likelihood: FloatArray) -> FloatArray:
         return aspects * likelihood
 
-    def _arrivals(self, mass: FloatArray) -> FloatArray:
-        """Mass that counted edges carry to each state under each action, shape [A, H, W]."""
-        model, edges = self.model, self.model.edges
-        shape = (model.n_actions, model.n_hypotheses, model.n_states)
-        carried = mass[edges.hypothesis, edges.source] * model.edge_probability
-        arrivals = np.bincount(model.edge_cells, weights=carried, minlength=int(np.prod(shape)))
-        return arrivals.astype(np.float64).reshape(shape)
-
     def _expected_entropies(self) -> FloatArray:
         """Return eq. 3 for each action, shape [A]."""
-        model = self.model
-        observed = 1.0 - model.parameters.observation_noise
-        mass = self.aspect_belief
-        total = mass.sum(axis=1)
-        noise = model.parameters.observation_noise / model.n_patterns * total
-        kept = np.einsum("hx,ahx->ah", mass, model.stay)
-        unreached = kept * (observed / model.n_aspects) + noise
-        arrivals = self._arrivals(mass)
-        reached = np.flatnonzero(arrivals)
-        targets = Targets(*np.unravel_index(reached, arrivals.shape))
-        joint = NextPatternJoint(
-            unknown=kept * model.base[:, COLLECTION] * model.unknown_rate + noise,
-            unreached=unreached,
-            targets=targets,
-            reached=unreached[targets.action, targets.hypothesis] + observed * arrivals.ravel()[reached],
-        )
-        return expected_entropies(model, joint, float(total[-1]))
+        return expected_entropies_of(self.model, self.aspect_belief)
 
     def _smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
         """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s by forward-backward."""

@@ -83,7 +83,7 @@ def test_other_numbers_of_actions_are_refused(text):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--engine", "magic"], "engine: unknown name 'magic'; expected one of: bayes-filter, enumeration, gtsam"),
+        (["--engine", "magic"], "engine: unknown name 'magic'; expected one of: bayes-filter, enumeration, gibbs,"),
         (["--world", "magic"], "world: unknown name 'magic'; expected one of: ideal, rendered"),
         (["--world", "nowhere:some/World-v0"], "world 'nowhere:some/World-v0': cannot be made"),
         (["--preset", "magic"], "preset: unknown name 'magic'; expected one of: default, paper"),

@@ -10,13 +10,14 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from atg_fg.engines import ENGINES, begin_trial
+from atg_fg.engines import begin_trial
 from atg_fg.engines.base import Inference
 from atg_fg.errors import ImpossibleEvidenceError
 from atg_fg.patterns import Evidence
 from tests.models import Case, Look, cases
+from tests.small import EXACT_ENGINES
 
-every_engine = pytest.mark.parametrize("engine", ENGINES)
+every_exact_engine = pytest.mark.parametrize("engine", EXACT_ENGINES)
 
 
 def played(engine: str, case: Case) -> Inference:
@@ -44,7 +45,7 @@ def same_answers(actual: Inference, expected: Inference) -> None:
     close(actual.expected_entropies(), expected.expected_entropies())
 
 
-@every_engine
+@every_exact_engine
 @given(case=cases())
 def test_probabilities_sum_to_one(engine: str, case: Case) -> None:
     inference = played(engine, case)
@@ -59,7 +60,7 @@ def test_probabilities_sum_to_one(engine: str, case: Case) -> None:
                 assert distribution.sum() == pytest.approx(1, abs=1e-12)
 
 
-@every_engine
+@every_exact_engine
 @given(case=cases())
 def test_an_action_is_never_expected_to_raise_the_entropy(engine: str, case: Case) -> None:
     inference = played(engine, case)
@@ -69,7 +70,7 @@ def test_an_action_is_never_expected_to_raise_the_entropy(engine: str, case: Cas
     assert (entropies <= inference.identity().entropy + 1e-12).all()
 
 
-@every_engine
+@every_exact_engine
 @given(case=cases())
 def test_asking_changes_nothing(engine: str, case: Case) -> None:
     inference, asked = played(engine, case), played(engine, case)
@@ -81,7 +82,7 @@ def test_asking_changes_nothing(engine: str, case: Case) -> None:
     same_answers(asked, inference)
 
 
-@every_engine
+@every_exact_engine
 @given(case=cases(), data=st.data())
 def test_reordering_the_memory_reorders_the_posterior_and_nothing_else(
     engine: str, case: Case, data: st.DataObject
@@ -95,14 +96,14 @@ def test_reordering_the_memory_reorders_the_posterior_and_nothing_else(
     close(reordered.expected_entropies(), inference.expected_entropies())
 
 
-@every_engine
+@every_exact_engine
 @given(case=cases(), data=st.data())
 def test_other_names_for_the_symbols_change_nothing(engine: str, case: Case, data: st.DataObject) -> None:
     new = data.draw(st.permutations(range(case.n_symbols)))
     same_answers(played(engine, case.with_symbols(new)), played(engine, case))
 
 
-@every_engine
+@every_exact_engine
 @given(case=cases(), data=st.data())
 def test_other_names_for_the_actions_reorder_the_expected_entropies_and_nothing_else(
     engine: str, case: Case, data: st.DataObject
@@ -114,7 +115,7 @@ def test_other_names_for_the_actions_reorder_the_expected_entropies_and_nothing_
     close(renamed.expected_entropies()[list(new)], inference.expected_entropies())
 
 
-@every_engine
+@every_exact_engine
 @given(case=cases(), data=st.data())
 def test_acting_and_seeing_nothing_tell_nothing_of_the_object(engine: str, case: Case, data: st.DataObject) -> None:
     inference = played(engine, case)
@@ -129,7 +130,7 @@ def test_acting_and_seeing_nothing_tell_nothing_of_the_object(engine: str, case:
     close(inference.log_evidence, log_evidence)
 
 
-@every_engine
+@every_exact_engine
 @given(case=cases(), exponent=st.floats(-30, 30), data=st.data())
 def test_evidence_scaled_by_c_adds_ln_c_to_the_log_evidence_and_nothing_else(
     engine: str, case: Case, exponent: float, data: st.DataObject
@@ -144,7 +145,7 @@ def test_evidence_scaled_by_c_adds_ln_c_to_the_log_evidence_and_nothing_else(
     close(actual.log_evidence, expected.log_evidence + exponent * log(10))
 
 
-@every_engine
+@every_exact_engine
 @given(case=cases())
 def test_a_remembered_twin_shares_its_probability_alike(engine: str, case: Case) -> None:
     assume(case.graphs)
@@ -153,7 +154,7 @@ def test_a_remembered_twin_shares_its_probability_alike(engine: str, case: Case)
     close(objects[-1], objects[0])
 
 
-@every_engine
+@every_exact_engine
 @given(case=cases())
 def test_the_memory_is_not_changed_by_a_trial(engine: str, case: Case) -> None:
     assert played(engine, case).memory == case.memory

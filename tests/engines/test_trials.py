@@ -9,10 +9,11 @@ from atg_fg.errors import ImpossibleEvidenceError, InvalidInputError, TooLargeEr
 from atg_fg.memory import RobotMemory
 from atg_fg.parameters import ModelParameters
 from atg_fg.patterns import Evidence
-from tests.small import graph, one_slot, seen, trial
+from tests.small import EXACT_ENGINES, graph, one_slot, seen, trial
 
 WORLD = one_slot(3, 2, 4)
 every_engine = pytest.mark.parametrize("engine", ENGINES)
+every_exact_engine = pytest.mark.parametrize("engine", EXACT_ENGINES)
 long_engines = pytest.mark.parametrize("engine", ["bayes-filter", "gtsam"])
 
 
@@ -29,13 +30,13 @@ def answers(inference: Inference) -> list[object]:
 
 @pytest.mark.parametrize("name", ["", "GTSAM", "kalman"])
 def test_an_unknown_engine_is_refused_with_the_names_there_are(name: str) -> None:
-    with pytest.raises(UnknownNameError, match="bayes-filter, enumeration, gtsam"):
+    with pytest.raises(UnknownNameError, match="bayes-filter, enumeration, gibbs, gtsam"):
         begin_trial(name, two_objects(), ModelParameters())
 
 
 def test_engines_are_registered_by_their_own_names() -> None:
     assert {name: engine.name for name, engine in ENGINES.items()} == {name: name for name in ENGINES}
-    assert all(engine.exact for engine in ENGINES.values())
+    assert {"bayes-filter", "enumeration", "gtsam"} < set(EXACT_ENGINES) < set(ENGINES)
 
 
 @every_engine
@@ -111,7 +112,8 @@ def test_the_impossible_is_refused_changes_nothing_and_the_trial_goes_on(
     np.testing.assert_array_equal(inference.expected_entropies(), untroubled.expected_entropies())
 
 
-@every_engine
+# The floor of mean-field's logarithms keeps every object above zero.
+@pytest.mark.parametrize("engine", sorted(set(ENGINES) - {"mean-field"}))
 def test_aspects_of_an_object_that_is_ruled_out_are_refused(engine: str) -> None:
     # Without noise pattern 2 cannot be A, so p(X | O = A, z) is not defined.
     inference = trial(engine, two_objects(), ModelParameters(0.0, 0.0, learn_in_trial=False), 2)
@@ -120,7 +122,7 @@ def test_aspects_of_an_object_that_is_ruled_out_are_refused(engine: str) -> None
         inference.smoothed_aspects(0)
 
 
-@every_engine
+@every_exact_engine
 @pytest.mark.parametrize("scale", [1e-200, 1e200])
 def test_evidence_on_any_scale_is_possible(engine: str, scale: float) -> None:
     inference, plain = (begin_trial(engine, two_objects(), ModelParameters(0.1, 0.1)) for _ in range(2))

@@ -1,0 +1,48 @@
+"""Keyword options of engines: which there are, and whether a value is what was expected."""
+
+from __future__ import annotations
+
+import inspect
+from collections.abc import Collection, Iterable
+
+import numpy as np
+
+from atg_fg.errors import InvalidInputError
+
+
+def options_of(engine: type) -> list[str]:
+    """Return the names of the options of an engine: the keyword-only parameters of its constructor."""
+    parameters = inspect.signature(engine).parameters.values()
+    return sorted(parameter.name for parameter in parameters if parameter.kind is parameter.KEYWORD_ONLY)
+
+
+def check_known(engine: type, name: str, options: Iterable[str]) -> None:
+    """Raise ``InvalidInputError`` if the engine named ``name`` lacks one of ``options``."""
+    known = options_of(engine)
+    for option in options:
+        if option not in known:
+            expected = f"one of: {', '.join(known)}" if known else "none, this engine has no options"
+            raise InvalidInputError(f"engine {name!r}: unknown option {option!r}; expected {expected}")
+
+
+def whole_number(option: str, value: object, least: int) -> int:
+    """Return ``value`` as an int, or raise ``InvalidInputError`` unless it is a whole number of at least ``least``."""
+    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    if not whole or int(value) < least:  # type: ignore[call-overload]
+        raise InvalidInputError(f"{option}: {value!r}; expected a whole number of at least {least}")
+    return int(value)  # type: ignore[call-overload, no-any-return]
+
+
+def number_between(option: str, value: object, least: float, below: float) -> float:
+    """Return ``value`` as a float, or raise ``InvalidInputError`` unless ``least`` ≤ value < ``below``."""
+    number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
+    if not number or not least <= float(value) < below:  # type: ignore[arg-type]
+        raise InvalidInputError(f"{option}: {value!r}; expected a number from {least} to below {below}")
+    return float(value)  # type: ignore[arg-type]
+
+
+def one_of(option: str, value: str, known: Collection[str]) -> str:
+    """Return ``value``, or raise ``InvalidInputError`` unless it is one of ``known``."""
+    if value not in known:
+        raise InvalidInputError(f"{option}: {value!r}; expected one of: {', '.join(known)}")
+    return value

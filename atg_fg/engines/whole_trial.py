@@ -1,0 +1,88 @@
+"""Engines that answer from the whole trial, anew after every step."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import NamedTuple
+
+import numpy as np
+
+from atg_fg.belief import IdentityBelief
+from atg_fg.chain import Chain
+from atg_fg.engines.support import SupportedInference
+from atg_fg.expected_entropy import expected_entropies_of
+from atg_fg.memory import RobotMemory
+from atg_fg.model import Revelation
+from atg_fg.parameters import ModelParameters
+from atg_fg.patterns import FloatArray
+
+
+class Posterior(NamedTuple):
+    """What an engine infers of one trial, exactly or not.
+
+    Attributes:
+        identity: p(O | z_0:t, a_1:t), shape [H].
+        joint: p(O, X_t | z_0:t, a_1:t), shape [H, W_t].
+        log_evidence: ln p(z_0:t | a_1:t).
+    """
+
+    identity: FloatArray
+    joint: FloatArray
+    log_evidence: float
+
+
+class WholeTrialInference(SupportedInference):
+    """Engines that make a ``Posterior`` of the trial's chain at the first question after a step, and keep it."""
+
+    def __init__(self, memory: RobotMemory, parameters: ModelParameters) -> None:
+        super().__init__(memory, parameters)
+        self._posterior: Posterior | None = None
+
+    @property
+    def posterior(self) -> Posterior:
+        """What is inferred of the trial so far; before the first look it is the prior."""
+        if self._posterior is None:
+            self._posterior = self._solve_scaled() if self.history.evidence else self._prior()
+        return self._posterior
+
+    def identity(self) -> IdentityBelief:
+        """Return p(O | z_0:t, a_1:t) (eq. 1 and 2)."""
+        probabilities = self.posterior.identity
+        return IdentityBelief(probabilities[:-1], float(probabilities[-1]), self.model.n_unseen)
+
+    @property
+    def log_evidence(self) -> float:
+        """Return ln p(z_0:t | a_1:t), or what the engine takes it to be."""
+        return self.posterior.log_evidence
+
+    def _prior(self) -> Posterior:
+        return Posterior(self.model.prior, self.model.prior[:, None] * self.model.base, 0.0)
+
+    def _solve_scaled(self) -> Posterior:
+        chain, log_scale = self.chain().scaled()
+        identity, joint, log_evidence = self._solve(chain)
+        return Posterior(identity, joint, log_evidence + log_scale)
+
+    def _expected_entropies(self) -> FloatArray:
+        """Return eq. 3 for each action, shape [A], exactly so for the engine's own p(O, X_t)."""
+        return expected_entropies_of(self.model, self.posterior.joint)
+
+    def _condition(self, likelihood: FloatArray) -> None:
+        self._posterior = None
+
+    def _share(self, revelation: Revelation) -> None:
+        self._posterior = None
+
+    def _advance(self, transition: FloatArray) -> None:
+        self._posterior = None
+
+    @abstractmethod
+    def _solve(self, chain: Chain) -> Posterior:
+        """Return the posterior of a chain whose likelihoods are at most one."""
+
+
+def joint_of(identity: FloatArray, aspects: FloatArray) -> FloatArray:
+    """Return p(O, X), shape [H, W], from p(O), shape [H], and weights of p(X | O) that need not be normalised."""
+    total = aspects.sum(axis=1)
+    joint: FloatArray = (identity / np.where(total > 0, total, 1.0))[:, None] * aspects
+    return joint

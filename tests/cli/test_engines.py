@@ -1,0 +1,67 @@
+import json
+
+
+def test_compare_says_for_each_engine_how_exact_it_is(run):
+    status, output, error = run(
+        "compare", "--trials", 2, "--actions", 2, "--remembered", 3, "--engines", "gtsam,bayes-filter", "--json", "-"
+    )
+    assert (status, error) == (0, "")
+    document = json.loads(output)
+    assert document["command"] == "compare"
+    assert set(document["engines"]) == {"gtsam", "bayes-filter"}
+    gtsam = document["engines"]["gtsam"]
+    assert gtsam["exact"] is True
+    assert gtsam["total_variation"]["worst"] < 1e-12
+    assert gtsam["same_decision"]["rate"] == 1
+    assert gtsam["time_ratio"]["median"] > 0
+
+
+def test_compare_prints_a_table(run):
+    status, output, error = run(
+        "compare", "--trials", 1, "--actions", 1, "--remembered", 1, "--engines", "bayes-filter"
+    )
+    assert (status, error) == (0, "")
+    assert "bayes-filter" in output
+    assert "same decision" in output
+
+
+def test_calibrate_tests_the_posteriors(run):
+    status, output, error = run("calibrate", "--trials", 60, "--json", "-")
+    assert (status, error) == (0, "")
+    document = json.loads(output)
+    assert document["parameters"] == {"engine": "bayes-filter", "trials": 60, "seed": 0}
+    assert 0 <= document["chi_square"]["p"] <= 1
+    assert len(document["averaged_posterior"]) == len(document["prior"]) == 6
+    status, output, _ = run("calibrate", "--trials", 20)
+    assert "chi-square" in output
+
+
+def test_explain_tells_how_it_can_have_come_about(run):
+    status, output, error = run("explain", "tests/data/scripted_trial.json", "--k", 2, "--smooth", "--json", "-")
+    assert (status, error) == (0, "")
+    document = json.loads(output)
+    best, second = document["explanations"]
+    assert best["object"] is None
+    assert second == {"object": "cube-000", "aspects": [[0, 1], [1, 5]], "probability": second["probability"]}
+    assert best["probability"] > second["probability"] > 0.3
+    assert sum(document["surprise"]) + document["log_evidence"] < 1e-9
+    assert document["smoothed"]["object"] == "cube-000"
+
+
+def test_explain_draws_the_same_samples_from_the_same_seed(run):
+    arguments = ["explain", "tests/data/scripted_trial.json", "--samples", 20, "--json", "-"]
+    first, again = (run(*arguments, "--seed", 1)[1] for _ in range(2))
+    other = run(*arguments, "--seed", 2)[1]
+    assert first == again != other
+    status, output, _ = run("explain", "tests/data/scripted_trial.json", "--samples", 1, "--smooth")
+    assert status == 0
+    assert "drawn from the posterior" in output
+
+
+def test_bad_options_are_refused(refused):
+    assert "unknown name 'magic'" in refused("compare", "--engines", "magic")
+    assert "unknown name 'magic'" in refused("calibrate", "--engine", "magic")
+    assert "--trials: 1" in refused("calibrate", "--trials", 1)
+    assert "n_trials: 0" in refused("compare", "--trials", 0)
+    assert "--k: 0" in refused("explain", "tests/data/scripted_trial.json", "--k", 0)
+    assert "nowhere.json" in refused("explain", "nowhere.json")

@@ -1,0 +1,153 @@
+"""The tests of the engines catch errors: each is planted in a copy of the library, and the copy's tests must fail."""
+
+import os
+import shutil
+import subprocess
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[1]
+#: The first two chunks of random models, every engine, the oracle beside them.
+TESTS = ["tests/engines/test_agreement.py", "-k", "posterior and (-0] or -1])"]
+
+
+@dataclass(frozen=True)
+class Fault:
+    """One error: in a file, a text that stands there once, and what stands there instead."""
+
+    name: str
+    file: str
+    right: str
+    wrong: str
+
+
+FAULTS = [
+    Fault(
+        "transitions transposed",
+        "model.py",
+        "where = (self.edges.hypothesis[chosen], self.edges.source[chosen], self.edges.target[chosen])",
+        "where = (self.edges.hypothesis[chosen], self.edges.target[chosen], self.edges.source[chosen])",
+    ),
+    Fault(
+        "posterior not normalised",
+        "engines/base.py",
+        "self._belief = _State(log_joint - log_probability, aspects)",
+        "self._belief = _State(log_joint, aspects)",
+    ),
+    Fault(
+        "keys of the transition factor in the wrong order",
+        "recognition.py",
+        "self._add([object_key(), aspect_key(time - 1), aspect_key(time)], transition)",
+        "self._add([object_key(), aspect_key(time), aspect_key(time - 1)], transition)",
+    ),
+    Fault(
+        "mass of the collection node lost",
+        "model.py",
+        "self.base[:, COLLECTION] = n_unobserved / self.n_aspects",
+        "self.base[:, COLLECTION] = 0.0",
+    ),
+    Fault(
+        "one unseen object too many",
+        "memory.py",
+        "return max(self.assumptions.n_objects - len(self), 1)",
+        "return max(self.assumptions.n_objects - len(self) + 1, 1)",
+    ),
+    Fault(
+        "unseen objects counted as one in the entropy",
+        "belief.py",
+        "float(self.unseen * np.log(self.n_unseen) - x_log_x(probabilities).sum())",
+        "float(-x_log_x(probabilities).sum())",
+    ),
+    Fault(
+        "noise of observations left out where a pattern is known",
+        "model.py",
+        ") + noise\n        table[:, COLLECTION]",
+        ")\n        table[:, COLLECTION]",
+    ),
+    Fault(
+        "patterns of known aspects expected of the collection node",
+        "model.py",
+        "n_unknown = np.maximum(n_patterns - self.n_known, 1)",
+        "n_unknown = np.full_like(self.n_known, n_patterns)",
+    ),
+    Fault(
+        "concentration left out of the edges' share",
+        "model.py",
+        "self.edge_probability = self.edges.weight / (totals[rows] + alpha)",
+        "self.edge_probability = self.edges.weight / totals[rows]",
+    ),
+    Fault(
+        "all of the collection node's belief given to a new aspect",
+        "model.py",
+        "shares = np.where(last, 1.0, truth / (truth + noise))",
+        "shares = np.ones_like(truth)",
+    ),
+    Fault(
+        "smoothing forward only",
+        "engines/bayes_filter.py",
+        "return [_normalised(past * future) for past, future in zip(forward, reversed(backward), strict=True)]",
+        "return forward",
+    ),
+    Fault(
+        "every edge counted once, however often it was seen",
+        "model.py",
+        "columns = np.array(entries, dtype=np.int64).reshape(-1, 5).T",
+        "columns = np.array([(*entry[:4], 1) for entry in entries], dtype=np.int64).reshape(-1, 5).T",
+    ),
+    Fault(
+        "evidence of the look before used for the look",
+        "chain.py",
+        "likelihood = model.likelihood(evidence)",
+        "likelihood = model.likelihood(history.evidence[max(step - 1, 0)])",
+    ),
+    Fault(
+        "expected entropy without its unseen objects",
+        "expected_entropy.py",
+        " - joint_terms + unseen * np.log(model.n_unseen)",
+        " - joint_terms",
+    ),
+]
+QUICK = FAULTS[:2]
+
+
+def passes_its_tests(folder: Path) -> bool:
+    """Run the copy's own tests in the folder of the copy."""
+    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-n", "0", *TESTS]
+    environment = {**os.environ, "PYTHONPATH": str(folder)}
+    done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode in (0, 1), done.stdout + done.stderr
+    return done.returncode == 0
+
+
+@pytest.fixture
+def copy(tmp_path):
+    for name in ("atg_fg", "tests"):
+        shutil.copytree(ROOT / name, tmp_path / name, ignore=shutil.ignore_patterns("__pycache__"))
+    shutil.copy(ROOT / "pyproject.toml", tmp_path)
+    return tmp_path
+
+
+def check_is_caught(fault: Fault, copy: Path) -> None:
+    file = copy / "atg_fg" / fault.file
+    text = file.read_text()
+    assert text.count(fault.right) == 1, f"{fault.file} has changed; expected once: {fault.right}"
+    file.write_text(text.replace(fault.right, fault.wrong))
+    assert not passes_its_tests(copy), f"not caught: {fault.name}"
+
+
+def test_the_copy_without_a_fault_passes(copy):
+    assert passes_its_tests(copy)
+
+
+@pytest.mark.parametrize("fault", QUICK, ids=lambda fault: fault.name)
+def test_a_planted_fault_is_caught(fault, copy):
+    check_is_caught(fault, copy)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", FAULTS[len(QUICK) :], ids=lambda fault: fault.name)
+def test_every_planted_fault_is_caught(fault, copy):
+    check_is_caught(fault, copy)
