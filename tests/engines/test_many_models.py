@@ -1,0 +1,49 @@
+"""Exact engines against brute force on 2,000 random models with a trial each, at the end of the trial."""
+
+import numpy as np
+import pytest
+
+from atg_fg.engines import begin_trial
+from atg_fg.errors import ImpossibleEvidenceError
+from tests.models import random_case
+from tests.small import EXACT_ENGINES
+
+CHUNKS, CHUNK_SIZE = 16, 125
+#: The routes make the whole graph anew at each question; each is given a part of the models.
+SLOW = [engine for engine in EXACT_ENGINES if engine.startswith("gtsam-")]
+
+
+def gone_through(engine, case):
+    inference = begin_trial(engine, case.memory, case.parameters)
+    alphabet = case.assumptions.alphabet
+    for time, look in enumerate(case.looks):
+        try:
+            inference.observe(look.evidence(alphabet))
+        except ImpossibleEvidenceError:
+            inference.observe(case.nothing.evidence(alphabet))
+        if time < len(case.actions):
+            inference.act(case.actions[time])
+    return inference
+
+
+def answers(inference, hypothesis):
+    belief = inference.identity()
+    numbers = [*belief.objects, belief.unseen, belief.entropy, inference.log_evidence]
+    for aspects in inference.smoothed_aspects(hypothesis):
+        numbers += aspects.tolist()
+    if not inference.history.awaits_evidence:
+        numbers += inference.expected_entropies().tolist()
+    return numbers
+
+
+@pytest.mark.parametrize("chunk", range(CHUNKS))
+def test_two_thousand_models_come_out_alike(chunk):
+    for seed in range(chunk * CHUNK_SIZE, (chunk + 1) * CHUNK_SIZE):
+        case = random_case(np.random.default_rng((1, seed)))
+        reference = gone_through("enumeration", case)
+        hypothesis = reference.identity().most_probable_hypothesis
+        expected = answers(reference, hypothesis)
+        routes = [SLOW[seed // 8 % len(SLOW)]] if seed % 8 == 0 else []
+        for engine in ["bayes-filter", "gtsam", *routes]:
+            actual = answers(gone_through(engine, case), hypothesis)
+            np.testing.assert_allclose(actual, expected, rtol=0, atol=1e-12, err_msg=f"model {seed}, {engine}")
