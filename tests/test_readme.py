@@ -18,6 +18,7 @@ SHORTER = {
     "figure3": ["--trials", "4"],
     "demo": ["--actions", "1"],
     "sim": ["--actions", "1", "--jobs", "1"],
+    "compare": ["--trials", "1"],
 }
 
 
