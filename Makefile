@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-all lint format notebooks bench results results-robot clean
+.PHONY: help setup demo test test-all lint format notebooks bench results results-engines results-robot clean
 
 help:  ## Say what there is to make
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -55,6 +55,13 @@ results: $(READY)  ## Run the experiments of README's results in the ideal world
 		--plot docs/images/figure3_paper.png
 	$(BIN)/atg-fg figure3 --preset default --json results/figure3_default.json --csv results/figure3_default.csv \
 		--plot docs/images/figure3_default.png
+
+# README's table of methods, and how calibrated each engine is (about a quarter of an hour).
+results-engines: $(READY)  ## Compare and calibrate all inference engines
+	$(BIN)/atg-fg compare --trials 50 --engines all --json results/compare.json
+	for engine in bayes-filter gtsam particle gibbs loopy-bp mean-field; do \
+		$(BIN)/atg-fg calibrate --engine $$engine --trials 5000 --json results/calibrate_$$engine.json || exit; \
+	done
 
 # Reliability first: the preset robot is estimated from it. A test that was cut off goes on where it stopped.
 ROBONAUT := table1 --world robonaut --engine bayes-filter --tests 1 --resume

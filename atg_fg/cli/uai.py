@@ -1,0 +1,105 @@
+"""``atg-fg uai``: solve discrete factor graphs in the UAI format, and write trials as such."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from atg_fg import store, uai_inference
+from atg_fg.cli import options
+from atg_fg.errors import InvalidInputError
+from atg_fg.scripted_trial import read_script
+from atg_fg.uai_export import export_trial
+from atg_fg.uai_format import DiscreteModel, read_evidence, read_model, write_evidence, write_model
+
+app = typer.Typer(
+    help="Solve discrete factor graphs in the UAI format, and write trials as such.", no_args_is_help=True
+)
+
+#: The line of a result, and the result as JSON has it.
+_Answer = tuple[str, dict[str, Any]]
+
+
+@app.command()
+def solve(
+    model: Annotated[Path, typer.Argument(help="A model in the UAI format.", show_default=False)],
+    task: Annotated[
+        str, typer.Option(help="MAR: marginals; PR: log10 of the partition function; MPE: most probable explanation.")
+    ],
+    evidence: Annotated[Path | None, typer.Option(help="Evidence in the UAI format.")] = None,
+    limit: Annotated[
+        int, typer.Option(help="Refuse if tables would have more entries; 8 bytes each.")
+    ] = uai_inference.DEFAULT_LIMIT,
+    json_file: options.JsonFile = None,
+) -> None:
+    """Solve a model exactly and print the result in the format of the UAI competitions.
+
+    Example: atg-fg uai solve grid.uai --evidence grid.uai.evid --task MAR
+    """
+    if task not in TASKS:
+        raise InvalidInputError(f"--task: {task!r}; expected one of: {', '.join(TASKS)}")
+    options.check_at_least(1, limit=limit)
+    options.check_json_option(json_file)
+    read = read_model(store.read_text_file(model), str(model))
+    observed: dict[int, int] = {}
+    if evidence is not None:
+        observed = read_evidence(store.read_text_file(evidence), str(evidence))
+        read.check_evidence(observed, str(evidence))
+    line, answer = TASKS[task](read, observed, limit)
+    options.write_json({"command": "uai solve", "model": str(model), "task": task, **answer}, json_file)
+    if json_file != "-":
+        typer.echo(f"{task}\n{line}")
+
+
+def _partition(model: DiscreteModel, evidence: dict[int, int], limit: int) -> _Answer:
+    logarithm = uai_inference.log_partition(model, evidence, limit)
+    return repr(logarithm / math.log(10)), {
+        "log10_partition": logarithm / math.log(10),
+        "log_partition": logarithm,
+    }
+
+
+def _marginals(model: DiscreteModel, evidence: dict[int, int], limit: int) -> _Answer:
+    marginals = [marginal.tolist() for marginal in uai_inference.marginals(model, evidence, limit)]
+    words = [str(len(marginals))]
+    for marginal in marginals:
+        words += [str(len(marginal)), *map(repr, marginal)]
+    return " ".join(words), {"marginals": marginals}
+
+
+def _explanation(model: DiscreteModel, evidence: dict[int, int], limit: int) -> _Answer:
+    states, log_weight = uai_inference.most_probable_explanation(model, evidence, limit)
+    return " ".join(map(str, (len(states), *states))), {"states": list(states), "log_weight": log_weight}
+
+
+TASKS: dict[str, Callable[[DiscreteModel, dict[int, int], int], _Answer]] = {
+    "MAR": _marginals,
+    "PR": _partition,
+    "MPE": _explanation,
+}
+
+
+@app.command()
+def export(
+    script: Annotated[Path, typer.Argument(help="A scripted trial (JSON).", show_default=False)],
+    model: Annotated[Path, typer.Option(help="Write the trial's factor graph to this file.")],
+    evidence: Annotated[Path, typer.Option(help="Write what was seen to this file.")],
+) -> None:
+    """Write the factor graph of a scripted trial and its evidence in the UAI format.
+
+    Example: atg-fg uai export trial.json --model trial.uai --evidence trial.uai.evid
+    """
+    if model.resolve() == evidence.resolve():
+        raise InvalidInputError(f"--evidence: {evidence} is the file of --model too; expected another file")
+    for path in (model, evidence):
+        store.check_writable(path)
+    exported = export_trial(read_script(store.read_text_file(script), str(script)))
+    store.write_bytes_atomically(model, write_model(exported.model).encode())
+    store.write_bytes_atomically(evidence, write_evidence(exported.evidence).encode())
+    typer.echo(
+        f"{model}: {len(exported.names)} variables, {', '.join(exported.names)}; {len(exported.model.factors)} factors"
+    )
