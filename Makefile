@@ -77,6 +77,8 @@ results-robot: $(READY)  ## Run the experiments on the simulated robot (about an
 		done; \
 	done
 	$(BIN)/atg-fg sim calibrate results/reliability_worn.json --output atg_fg/data/robot.json
+	$(BIN)/atg-fg $(ROBONAUT) --condition worn --preset robot --records results/robonaut/worn_robot \
+		--json results/table1_robonaut_worn_robot.json
 	$(BIN)/atg-fg sim picture --output docs/images/robonaut.png --film docs/images/robonaut.gif
 
 clean:  ## Remove what make has made
