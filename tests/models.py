@@ -12,6 +12,9 @@ import numpy as np
 from hypothesis import strategies as st
 
 from atg_fg.assumptions import Assumptions
+from atg_fg.engines import begin_trial
+from atg_fg.engines.base import Inference
+from atg_fg.errors import ImpossibleEvidenceError
 from atg_fg.graph import AspectTransitionGraph
 from atg_fg.memory import RobotMemory
 from atg_fg.parameters import ModelParameters
@@ -127,6 +130,20 @@ class Case:
         """The same case with every action a called new[a]."""
         graphs = [Atg(atg.known, {(x, new[a], y): n for (x, a, y), n in atg.counts.items()}) for atg in self.graphs]
         return replace(self, graphs=tuple(graphs), actions=tuple(new[a] for a in self.actions))
+
+
+def gone_through(engine: str, case: Case) -> Inference:
+    """An engine at the end of a case's trial; where a look is impossible, nothing is seen instead."""
+    inference = begin_trial(engine, case.memory, case.parameters)
+    alphabet = case.assumptions.alphabet
+    for time, look in enumerate(case.looks):
+        try:
+            inference.observe(look.evidence(alphabet))
+        except ImpossibleEvidenceError:
+            inference.observe(case.nothing.evidence(alphabet))
+        if time < len(case.actions):
+            inference.act(case.actions[time])
+    return inference
 
 
 def graph_of(assumptions: Assumptions, name: str, atg: Atg) -> AspectTransitionGraph:

@@ -10,24 +10,13 @@ from atg_fg.errors import ImpossibleEvidenceError, InvalidInputError
 from atg_fg.explanations import best_explanations, sample_explanations, surprise
 from atg_fg.factors import aspect_key, object_key
 from atg_fg.recognition import RecognitionGraph
-from tests.models import random_case
+from tests.models import gone_through, random_case
 
 SEEDS = range(60)
 
 
 def after_a_trial(seed, engine="enumeration"):
-    """An engine at the end of a random trial; impossible looks are left out by seeing nothing."""
-    case = random_case(np.random.default_rng(seed))
-    inference = begin_trial(engine, case.memory, case.parameters)
-    alphabet = case.assumptions.alphabet
-    for time, look in enumerate(case.looks):
-        try:
-            inference.observe(look.evidence(alphabet))
-        except ImpossibleEvidenceError:
-            inference.observe(case.nothing.evidence(alphabet))
-        if time < len(case.actions):
-            inference.act(case.actions[time])
-    return inference
+    return gone_through(engine, random_case(np.random.default_rng(seed)))
 
 
 def by_hand():

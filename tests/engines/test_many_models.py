@@ -3,27 +3,12 @@
 import numpy as np
 import pytest
 
-from atg_fg.engines import begin_trial
-from atg_fg.errors import ImpossibleEvidenceError
-from tests.models import random_case
+from tests.models import gone_through, random_case
 from tests.small import EXACT_ENGINES
 
 CHUNKS, CHUNK_SIZE = 16, 125
 #: The routes make the whole graph anew at each question; each is given a part of the models.
 SLOW = [engine for engine in EXACT_ENGINES if engine.startswith("gtsam-")]
-
-
-def gone_through(engine, case):
-    inference = begin_trial(engine, case.memory, case.parameters)
-    alphabet = case.assumptions.alphabet
-    for time, look in enumerate(case.looks):
-        try:
-            inference.observe(look.evidence(alphabet))
-        except ImpossibleEvidenceError:
-            inference.observe(case.nothing.evidence(alphabet))
-        if time < len(case.actions):
-            inference.act(case.actions[time])
-    return inference
 
 
 def answers(inference, hypothesis):
