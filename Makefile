@@ -77,8 +77,6 @@ results-robot: $(READY)  ## Run the experiments on the simulated robot (about an
 		done; \
 	done
 	$(BIN)/atg-fg sim calibrate results/reliability_worn.json --output atg_fg/data/robot.json
-	$(BIN)/atg-fg $(ROBONAUT) --condition worn --preset robot --records results/robonaut/worn_robot \
-		--json results/table1_robonaut_worn_robot.json
 	for preset in default robot; do \
 		$(BIN)/atg-fg table1 --slip 0.038 --missing 0.032 --preset $$preset --tests 20 --engine bayes-filter \
 			--json results/table1_noisy_$$preset.json || exit; \
