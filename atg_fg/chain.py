@@ -126,17 +126,23 @@ class ForwardPass(NamedTuple):
     """The Bayes filter of a whole chain, one object at a time, as logarithms where numbers may be small.
 
     Attributes:
-        log_joint: ln p(O, z_0:t | a_1:t), −∞ where an object is ruled out, shape [H].
+        log_joints: ln p(O, z_0:s | a_1:s) for every time s, −∞ where an object is ruled out, each of shape [H].
         filtered: p(X_s | O, z_0:s, a_1:s) for every time s, each of shape [H, W_s]; zero where an object is ruled out.
     """
 
-    log_joint: FloatArray
+    log_joints: tuple[FloatArray, ...]
     filtered: tuple[FloatArray, ...]
+
+    @property
+    def log_joint(self) -> FloatArray:
+        """Return ln p(O, z_0:t | a_1:t) at the end of the trial, shape [H]."""
+        return self.log_joints[-1]
 
 
 def forward_pass(chain: Chain) -> ForwardPass:
     """Return the forward pass of a chain."""
     log_joint = np.log(chain.prior)
+    log_joints: list[FloatArray] = []
     filtered: list[FloatArray] = []
     predicted = chain.initial
     for time in range(len(chain.widths)):
@@ -146,5 +152,6 @@ def forward_pass(chain: Chain) -> ForwardPass:
         total = joint.sum(axis=1)
         possible = total > 0
         log_joint = log_joint + np.log(total, out=np.full_like(total, -np.inf), where=possible)
+        log_joints.append(log_joint)
         filtered.append(joint / np.where(possible, total, 1.0)[:, None])
-    return ForwardPass(log_joint, tuple(filtered))
+    return ForwardPass(tuple(log_joints), tuple(filtered))

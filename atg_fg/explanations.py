@@ -9,7 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from atg_fg.chain import Chain
+from atg_fg.belief import log_sum_exp
+from atg_fg.chain import Chain, ForwardPass, forward_pass
 from atg_fg.errors import ImpossibleEvidenceError, InvalidInputError
 from atg_fg.patterns import FloatArray, IntArray
 
@@ -46,7 +47,7 @@ def best_explanations(chain: Chain, k: int = 1) -> list[Explanation]:
     if k < 1:
         raise InvalidInputError(f"k: {k}; expected a whole number of at least 1")
     likelihoods = _likelihoods(chain)
-    log_evidence = float(surprise(chain).sum()) * -1.0
+    log_evidence = log_sum_exp(_possible(chain).log_joint)
     #: ln p of the r-th best way to each state, shape [H, W, r], and where it came from, flat over (state, rank)
     scores = (_log(chain.prior)[:, None] + _log(chain.initial) + _log(likelihoods[0]))[:, :, None]
     origins: list[IntArray] = []
@@ -62,12 +63,12 @@ def best_explanations(chain: Chain, k: int = 1) -> list[Explanation]:
         hypothesis, state, rank = (int(index) for index in np.unravel_index(flat, scores.shape))
         log_joint = float(scores[hypothesis, state, rank])
         if np.isfinite(log_joint):
-            states = _traced(origins, hypothesis, state, rank, k)
+            states = _traced(origins, hypothesis, state, rank)
             found.append(Explanation(hypothesis, states, log_joint - log_evidence))
     return found
 
 
-def _traced(origins: list[IntArray], hypothesis: int, state: int, rank: int, k: int) -> tuple[int, ...]:
+def _traced(origins: list[IntArray], hypothesis: int, state: int, rank: int) -> tuple[int, ...]:
     """Follow the origins back from a last state."""
     states = [state]
     for time in range(len(origins) - 1, -1, -1):
@@ -87,9 +88,9 @@ def sample_explanations(chain: Chain, n: int, rng: np.random.Generator) -> list[
     """
     if n < 1:
         raise InvalidInputError(f"n: {n}; expected a whole number of at least 1")
-    filtered, log_joint = _forward(chain)
-    log_weights = log_joint[-1]
-    log_identity = log_weights - _log_sum(log_weights)
+    past = _possible(chain)
+    filtered = past.filtered
+    log_identity = past.log_joint - log_sum_exp(past.log_joint)
     hypotheses = rng.choice(len(log_identity), size=n, p=np.exp(log_identity) / np.exp(log_identity).sum())
     drawn = []
     for hypothesis in hypotheses:
@@ -110,31 +111,21 @@ def surprise(chain: Chain) -> FloatArray:
     Raises:
         ImpossibleEvidenceError: The evidence has probability zero.
     """
-    _, log_joint = _forward(chain)
-    log_evidence = np.array([_log_sum(weights) for weights in log_joint[: len(chain.likelihoods)]])
+    log_joints = _possible(chain).log_joints[: len(chain.likelihoods)]
+    log_evidence = np.array([log_sum_exp(log_joint) for log_joint in log_joints])
     return -np.diff(log_evidence, prepend=0.0)
 
 
-def _forward(chain: Chain) -> tuple[list[FloatArray], list[FloatArray]]:
-    """Return p(X_s | O, z_0:s), shape [H, W_s], and ln p(O, z_0:s), shape [H], of every time s."""
-    predicted, log_weights = chain.initial, _log(chain.prior)
-    filtered: list[FloatArray] = []
-    log_joint: list[FloatArray] = []
-    for time, likelihood in enumerate(_likelihoods(chain)):
-        if time:
-            predicted = np.einsum("hx,hxy->hy", filtered[-1], chain.transitions[time - 1])
-        joint = predicted * likelihood
-        total = joint.sum(axis=1)
-        possible = total > 0
-        log_weights = log_weights + _log(total)
-        filtered.append(np.where(possible[:, None], joint / np.where(possible, total, 1.0)[:, None], predicted))
-        log_joint.append(log_weights)
-        if not np.isfinite(log_weights).any():
+def _possible(chain: Chain) -> ForwardPass:
+    """Return the forward pass, or raise ``ImpossibleEvidenceError`` at the first look that no object allows."""
+    past = forward_pass(chain)
+    for time, log_joint in enumerate(past.log_joints):
+        if not np.isfinite(log_joint).any():
             raise ImpossibleEvidenceError(
                 f"observation {time}: the evidence has probability zero under the model; "
                 "expected evidence that some object could give, or noise above 0"
             )
-    return filtered, log_joint
+    return past
 
 
 def _likelihoods(chain: Chain) -> list[FloatArray]:
@@ -145,9 +136,3 @@ def _likelihoods(chain: Chain) -> list[FloatArray]:
 
 def _log(values: FloatArray) -> FloatArray:
     return np.log(values, out=np.full_like(values, -np.inf), where=values > 0)
-
-
-def _log_sum(logarithms: FloatArray) -> float:
-    """Return ln Σ exp."""
-    greatest = float(logarithms.max())
-    return greatest + float(np.log(np.exp(logarithms - greatest).sum())) if np.isfinite(greatest) else greatest

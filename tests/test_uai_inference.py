@@ -88,7 +88,8 @@ def chain(table, length):
 
 def grid(side, rng):
     number = np.arange(side * side).reshape(side, side)
-    edges = [*zip(number[:, :-1].flat, number[:, 1:].flat), *zip(number[:-1].flat, number[1:].flat)]  # noqa: B905
+    pairs = (number[:, :-1], number[:, 1:]), (number[:-1], number[1:])
+    edges = [edge for ones, others in pairs for edge in zip(ones.flat, others.flat, strict=True)]
     return DiscreteModel((2,) * side**2, tuple(((int(a), int(b)), rng.random((2, 2))) for a, b in edges))
 
 

@@ -135,11 +135,11 @@ class ParticleFilter(SupportedInference):
     def _rejuvenate(self, likelihood: FloatArray) -> None:
         """Draw all particles anew from the exact one-step prior times the likelihood."""
         chain, _ = self.chain().scaled()
-        log_joint, filtered = forward_pass(chain)
+        past = forward_pass(chain)
         # Only differences count, and those of an object below the least float would not be drawn anyway; with the
         # likelihood inside the logarithm the greatest of them is 1.
-        log_prior = log_joint - log_sum_exp(log_joint)
-        given = filtered[-1] * likelihood
+        log_prior = past.log_joint - log_sum_exp(past.log_joint)
+        given = past.filtered[-1] * likelihood
         total = given.sum(axis=1)
         logarithms = log_prior + np.log(total, out=np.full_like(total, -np.inf), where=total > 0)
         log_probability = log_sum_exp(logarithms)

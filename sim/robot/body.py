@@ -24,7 +24,7 @@ _NECK_POSTURE: Final = (0.10, 0.0, -0.65)
 #: Links along an arm nearer than this cannot hit each other; their shapes overlap at the joint.
 _NEIGHBOURS: Final = 3
 _JOINT_DAMPING: Final = 0.1  # N·m·s/rad
-#: Joint angles of both arms with the hands beside the cube, rad: the best of 192 random starts of a whole flip.
+#: Joint angles of both arms with the hands beside the cube, rad: within the joints' limits all through a flip.
 HOME_POSTURE: Final[FloatArray] = np.tile([0.245, -0.483, -1.357, -2.167, 2.198, 0.127, 0.050], (2, 1))
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from atg_fg.patterns import FloatArray
 from sim.robot.body import RobotBody
 
-TIME_STEP: Final = 1 / 240  # s; the springs are unstable at 1/120
+TIME_STEP: Final = 1 / 240  # s; a longer step makes such stiff springs unstable
 _STIFFNESS: Final = np.array([900.0, 900.0, 500.0, 600.0, 200.0, 120.0, 120.0])  # N·m/rad
 _DAMPING: Final = np.array([60.0, 60.0, 16.0, 20.0, 3.0, 2.0, 1.5])  # N·m·s/rad
 #: The share of a joint's speed that motions are planned with, on the mean: a curve from rest to rest peaks at 1.5.

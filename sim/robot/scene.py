@@ -72,31 +72,9 @@ class Scene:
         self._table = self._build_table()
         self.cube = CubeBody(self.client, circumstances.cube_mass)
         self.robot = RobotBody(self.client, urdf)
-        self.apply(circumstances)
+        self._apply(circumstances)
         self.cube.show(tags)
         self.cube.place(position, rotation)
-
-    def apply(self, circumstances: Circumstances) -> None:
-        """Set masses, frictions and the direction of gravity."""
-        forwards, leftwards = np.sin(circumstances.lean)
-        down = np.sqrt(1 - forwards**2 - leftwards**2)
-        pybullet.setGravity(*(_GRAVITY * np.array([forwards, leftwards, -down])), physicsClientId=self.client)
-        self.robot.set_pad_friction(circumstances.pad_friction, circumstances.pad_patch)
-        mass = circumstances.cube_mass
-        inertia = [mass * CUBE_SIZE**2 / 6] * 3
-        pybullet.changeDynamics(
-            self.cube.body,
-            -1,
-            mass=mass,
-            localInertiaDiagonal=inertia,
-            lateralFriction=circumstances.cube_friction,
-            linearDamping=0.02,
-            angularDamping=0.05,
-            physicsClientId=self.client,
-        )
-        pybullet.changeDynamics(
-            self._table, -1, lateralFriction=circumstances.table_friction, physicsClientId=self.client
-        )
 
     def advance(self) -> None:
         """Take the simulation one step on."""
@@ -131,6 +109,28 @@ class Scene:
     def close(self) -> None:
         """Leave PyBullet; the scene cannot be used any more."""
         self._disconnect()
+
+    def _apply(self, circumstances: Circumstances) -> None:
+        """Set masses, frictions and the direction of gravity."""
+        forwards, leftwards = np.sin(circumstances.lean)
+        down = np.sqrt(1 - forwards**2 - leftwards**2)
+        pybullet.setGravity(*(_GRAVITY * np.array([forwards, leftwards, -down])), physicsClientId=self.client)
+        self.robot.set_pad_friction(circumstances.pad_friction, circumstances.pad_patch)
+        mass = circumstances.cube_mass
+        inertia = [mass * CUBE_SIZE**2 / 6] * 3
+        pybullet.changeDynamics(
+            self.cube.body,
+            -1,
+            mass=mass,
+            localInertiaDiagonal=inertia,
+            lateralFriction=circumstances.cube_friction,
+            linearDamping=0.02,
+            angularDamping=0.05,
+            physicsClientId=self.client,
+        )
+        pybullet.changeDynamics(
+            self._table, -1, lateralFriction=circumstances.table_friction, physicsClientId=self.client
+        )
 
     def _build_table(self) -> int:
         half = [TABLE_SIZE[0] / 2, TABLE_SIZE[1] / 2, 0.02]

@@ -15,12 +15,13 @@ from sim.robot import shell
 from sim.robot.shell import Shape
 from sim.robot.table import NECK, SIDES, WAIST, Joint, arm
 
+_MATERIALS: Final = {shell.WHITE: "white", shell.GREY: "grey", shell.DARK: "dark", shell.GOLD: "gold"}
 #: How round each kind of shape is seen, lengthwise and around: 1 is a ball, towards 0 a box.
 _ROUNDNESS: Final = {"ball": (1.0, 1.0), "rounded": (0.45, 0.45), "capsule": (0.4, 1.0)}
 
 
 def write_robot(folder: Path) -> Path:
-    """Write the robot's URDF and its two meshes into ``folder`` and return the URDF's path."""
+    """Write the robot's URDF and its meshes into ``folder`` and return the URDF's path."""
     for kind, roundness in _ROUNDNESS.items():
         (folder / f"{kind}.obj").write_text(_superellipsoid(*roundness))
     path = folder / "robonaut.urdf"
@@ -31,7 +32,7 @@ def write_robot(folder: Path) -> Path:
 def robot_urdf() -> str:
     """Return the robot's description; meshes are looked for beside it."""
     robot = ElementTree.Element("robot", name="robonaut")
-    for name, colour in (("white", shell.WHITE), ("grey", shell.GREY), ("dark", shell.DARK), ("gold", shell.GOLD)):
+    for colour, name in _MATERIALS.items():
         material = ElementTree.SubElement(robot, "material", name=name)
         ElementTree.SubElement(material, "color", rgba=colour)
     _add_link(robot, "base", np.zeros(3), shell.pedestal_shapes(), mass=60.0)
@@ -87,8 +88,7 @@ def _add_link(
         if shape.visible:
             visual = ElementTree.SubElement(link, "visual")
             _add_geometry(visual, shape, origin, as_seen=True)
-            names = {shell.WHITE: "white", shell.GREY: "grey", shell.DARK: "dark", shell.GOLD: "gold"}
-            ElementTree.SubElement(visual, "material", name=names[shape.colour])
+            ElementTree.SubElement(visual, "material", name=_MATERIALS[shape.colour])
         if shape.solid:
             _add_geometry(ElementTree.SubElement(link, "collision"), shape, origin, as_seen=False)
 

@@ -39,7 +39,13 @@ _ACTIONS: Final = tuple(ACTION_SOURCES)
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """A world between two actions, as ``RobonautARcubeWorld.save`` keeps it."""
+    """A world between two actions, as ``RobonautARcubeWorld.save`` keeps it.
+
+    Attributes:
+        scene: The trial's scene; no other can be set back to this.
+        state: Number of the bodies' state in it.
+        world: What the world and its controller hold.
+    """
 
     scene: Scene
     state: int
@@ -155,7 +161,7 @@ class RobonautARcubeWorld(ARcubeWorld):
         if snapshot.scene is not self.scene:
             raise InvalidInputError("restore: the state is of another trial; expected one kept since the last reset")
         kept = copy.deepcopy(snapshot.world)
-        self.object, self.orientation, self.lost = kept["object"], kept["orientation"], kept["lost"]
+        self.orientation, self.lost = kept["orientation"], kept["lost"]
         self.scene.restore(snapshot.state)
         self.scene.steps, self._seen_at = kept["steps"], kept["seen_at"]
         self.controller.reference, self.controller.feedforward = kept["reference"], kept["feedforward"]
@@ -168,7 +174,6 @@ class RobonautARcubeWorld(ARcubeWorld):
 
     def _state(self) -> dict[str, Any]:
         return {
-            "object": self.object,
             "orientation": self.orientation,
             "lost": self.lost,
             "steps": self.scene.steps,

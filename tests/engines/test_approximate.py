@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from atg_fg.comparison import total_variation
 from atg_fg.engines import begin_trial
 from atg_fg.engines.base import Inference
 from atg_fg.engines.gibbs_sampling import GibbsSampling
@@ -40,12 +41,8 @@ def objects_of(inference: Inference) -> Any:
     return np.append(belief.objects, belief.unseen)
 
 
-def total_variation(actual: Inference, expected: Inference) -> float:
-    return float(np.abs(objects_of(actual) - objects_of(expected)).sum() / 2)
-
-
 def played(engine: str, case: Case, **options: Any) -> Inference:
-    """The case's trial, with nothing seen where a look is impossible."""
+    """The case's trial up to its last look, with nothing seen where a look is impossible."""
     inference = begin_trial(engine, case.memory, case.parameters, **options)
     for time, look in enumerate(case.looks):
         try:
