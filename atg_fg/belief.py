@@ -6,12 +6,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from atg_fg.errors import InvalidInputError
 from atg_fg.patterns import FloatArray
 
 
 def x_log_x(x: FloatArray) -> FloatArray:
     """Return x ln x, elementwise, with 0 ln 0 = 0."""
     return x * np.log(x, out=np.zeros_like(x), where=x > 0)
+
+
+def log_of(x: FloatArray) -> FloatArray:
+    """Return ln x, elementwise, with ln 0 = −∞."""
+    return np.log(x, out=np.full_like(x, -np.inf), where=x > 0)
 
 
 def log_sum_exp(logarithms: FloatArray) -> float:
@@ -34,6 +40,35 @@ class IdentityBelief:
     unseen: float
     n_unseen: int
 
+    @classmethod
+    def of(cls, probabilities: FloatArray, n_unseen: int) -> IdentityBelief:
+        """Return the belief with these probabilities of the states of O, shape [K + 1], *unseen* last."""
+        return cls(probabilities[:-1], float(probabilities[-1]), n_unseen)
+
+    @property
+    def probabilities(self) -> FloatArray:
+        """Probability of each state of O, shape [K + 1]: the remembered objects, then *unseen*."""
+        return np.append(self.objects, self.unseen)
+
+    def check(self, n_objects: int, n_unseen: int) -> None:
+        """Check that this is a distribution over ``n_objects`` remembered objects and ``n_unseen`` unseen ones.
+
+        Raises:
+            InvalidInputError: It is about other objects, or its probabilities are not finite numbers of at least 0
+                whose sum is 1 within 1e-9.
+        """
+        if np.shape(self.objects) != (n_objects,) or self.n_unseen != n_unseen:
+            raise InvalidInputError(
+                f"belief: objects of shape {np.shape(self.objects)} and {self.n_unseen} unseen ones; "
+                f"expected shape ({n_objects},) and {n_unseen}"
+            )
+        probabilities = self.probabilities
+        if not (probabilities.min() >= 0 and abs(probabilities.sum() - 1.0) <= 1e-9):  # a NaN is neither
+            raise InvalidInputError(
+                f"belief: probabilities from {probabilities.min()!r} with sum {probabilities.sum()!r}; "
+                "expected none below 0, and sum 1 within 1e-9"
+            )
+
     @property
     def is_novel(self) -> bool:
         """Whether the object is judged novel: the probability of *unseen* is above one half."""
@@ -47,10 +82,9 @@ class IdentityBelief:
     @property
     def most_probable_hypothesis(self) -> int:
         """Index of the most probable state of O; K stands for *unseen*."""
-        return int(np.append(self.objects, self.unseen).argmax())
+        return int(self.probabilities.argmax())
 
     @property
     def entropy(self) -> float:
         """H(O) in nats, with the unseen objects counted one by one."""
-        probabilities = np.append(self.objects, self.unseen)
-        return max(0.0, float(self.unseen * np.log(self.n_unseen) - x_log_x(probabilities).sum()))
+        return max(0.0, float(self.unseen * np.log(self.n_unseen) - x_log_x(self.probabilities).sum()))

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from atg_fg.belief import IdentityBelief, log_of
 from atg_fg.errors import InvalidInputError
 from atg_fg.memory import RobotMemory
 from atg_fg.model import COLLECTION, RecognitionModel, Revelation
@@ -94,15 +95,16 @@ def build_chain(
     parameters: ModelParameters,
     history: History,
     hypotheses: Sequence[int] | None = None,
+    prior: IdentityBelief | None = None,
 ) -> Chain:
-    """Return the chain of a trial, for all hypotheses or for some of them.
+    """Return the chain of a trial, for all hypotheses or for some of them, from the memory's p(O) or from ``prior``.
 
     With learning within the trial the state space of X_s is the one *after* z_s was learned from: a new aspect is
     reached as its collection node was, and the two share that node's likelihood as ``docs/model.md`` says.
     """
     if not history.evidence:
         raise InvalidInputError("trial: nothing observed yet; expected a first observation")
-    model = RecognitionModel(memory, parameters)
+    model = RecognitionModel(memory, parameters, prior)
     chosen = list(range(model.n_hypotheses)) if hypotheses is None else list(hypotheses)
     incoming: list[FloatArray] = []
     likelihoods: list[FloatArray] = []
@@ -141,7 +143,7 @@ class ForwardPass(NamedTuple):
 
 def forward_pass(chain: Chain) -> ForwardPass:
     """Return the forward pass of a chain."""
-    log_joint = np.log(chain.prior)
+    log_joint = log_of(chain.prior)
     log_joints: list[FloatArray] = []
     filtered: list[FloatArray] = []
     predicted = chain.initial
@@ -150,8 +152,7 @@ def forward_pass(chain: Chain) -> ForwardPass:
             predicted = np.matmul(filtered[-1][:, None, :], chain.transitions[time - 1])[:, 0, :]
         joint = predicted * chain.likelihoods[time] if time < len(chain.likelihoods) else predicted
         total = joint.sum(axis=1)
-        possible = total > 0
-        log_joint = log_joint + np.log(total, out=np.full_like(total, -np.inf), where=possible)
+        log_joint = log_joint + log_of(total)
         log_joints.append(log_joint)
-        filtered.append(joint / np.where(possible, total, 1.0)[:, None])
+        filtered.append(joint / np.where(total > 0, total, 1.0)[:, None])
     return ForwardPass(tuple(log_joints), tuple(filtered))

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from atg_fg.belief import log_sum_exp
+from atg_fg.belief import log_of, log_sum_exp
 from atg_fg.chain import Chain, ForwardPass, forward_pass
 from atg_fg.errors import ImpossibleEvidenceError, InvalidInputError
 from atg_fg.patterns import FloatArray, IntArray
@@ -49,14 +49,14 @@ def best_explanations(chain: Chain, k: int = 1) -> list[Explanation]:
     likelihoods = _likelihoods(chain)
     log_evidence = log_sum_exp(_possible(chain).log_joint)
     #: ln p of the r-th best way to each state, shape [H, W, r], and where it came from, flat over (state, rank)
-    scores = (_log(chain.prior)[:, None] + _log(chain.initial) + _log(likelihoods[0]))[:, :, None]
+    scores = (log_of(chain.prior)[:, None] + log_of(chain.initial) + log_of(likelihoods[0]))[:, :, None]
     origins: list[IntArray] = []
     for transition, likelihood in zip(chain.transitions, likelihoods[1:], strict=True):
-        ways = scores[:, :, :, None] + _log(transition)[:, :, None, :]
+        ways = scores[:, :, :, None] + log_of(transition)[:, :, None, :]
         ways = ways.reshape(len(ways), -1, transition.shape[2])
         best = np.argsort(-ways, axis=1, kind="stable")[:, :k]
         origins.append(best.transpose(0, 2, 1))
-        scores = np.take_along_axis(ways, best, axis=1).transpose(0, 2, 1) + _log(likelihood)[:, :, None]
+        scores = np.take_along_axis(ways, best, axis=1).transpose(0, 2, 1) + log_of(likelihood)[:, :, None]
     order = np.argsort(-scores, axis=None, kind="stable")[:k]
     found = []
     for flat in order:
@@ -132,7 +132,3 @@ def _likelihoods(chain: Chain) -> list[FloatArray]:
     """Return p(z_s | X_s, O) for every time, ones where nothing was seen yet."""
     unseen_yet = [np.ones((len(chain.prior), width)) for width in chain.widths[len(chain.likelihoods) :]]
     return [*chain.likelihoods, *unseen_yet]
-
-
-def _log(values: FloatArray) -> FloatArray:
-    return np.log(values, out=np.full_like(values, -np.inf), where=values > 0)

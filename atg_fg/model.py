@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from atg_fg.belief import IdentityBelief
 from atg_fg.memory import RobotMemory
 from atg_fg.parameters import ModelParameters
 from atg_fg.patterns import Evidence, FloatArray, IntArray
@@ -68,6 +69,10 @@ class RecognitionModel:
     Args:
         memory: The robot memory when the trial begins; it is not changed.
         parameters: α, δ and whether to learn within the trial.
+        prior: p(O) in place of the memory's 1/N each and U/N; zeros rule objects out.
+
+    Raises:
+        InvalidInputError: ``prior`` is not a distribution over the objects of this memory.
 
     Attributes:
         prior: p(O), shape [H].
@@ -77,7 +82,7 @@ class RecognitionModel:
         edges: The counted transitions.
     """
 
-    def __init__(self, memory: RobotMemory, parameters: ModelParameters) -> None:
+    def __init__(self, memory: RobotMemory, parameters: ModelParameters, prior: IdentityBelief | None = None) -> None:
         assumptions = memory.assumptions
         self.memory = memory
         self.parameters = parameters
@@ -88,6 +93,9 @@ class RecognitionModel:
         self.n_hypotheses = len(memory) + 1
         graphs = list(memory)
         self.prior = np.append(np.ones(len(graphs)), self.n_unseen) / (len(graphs) + self.n_unseen)
+        if prior is not None:
+            prior.check(len(graphs), self.n_unseen)
+            self.prior = prior.probabilities / prior.probabilities.sum()
         self.n_known = np.array([graph.n_known for graph in graphs] + [0], dtype=np.int64)
         self.aspect_of = np.full((self.n_hypotheses, self.n_patterns), COLLECTION, dtype=np.int64)
         self.pattern_of = np.full((self.n_hypotheses, 1 + int(self.n_known.max())), -1, dtype=np.int64)

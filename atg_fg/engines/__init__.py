@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final
 
+from atg_fg.belief import IdentityBelief
 from atg_fg.engines.base import Inference
 from atg_fg.engines.bayes_filter import BayesFilter
 from atg_fg.engines.enumeration import Enumeration
@@ -36,21 +37,29 @@ ENGINES: Final[dict[str, type[Inference]]] = {
 }
 
 
-def begin_trial(engine: str, memory: RobotMemory, parameters: ModelParameters, **options: Any) -> Inference:
+def begin_trial(
+    engine: str,
+    memory: RobotMemory,
+    parameters: ModelParameters,
+    prior: IdentityBelief | None = None,
+    **options: Any,
+) -> Inference:
     """Return the engine named ``engine`` at the beginning of a trial.
 
     Args:
         engine: A name in ``ENGINES``.
         memory: The robot memory when the trial begins; it is not changed.
         parameters: α, δ and whether to learn within the trial.
+        prior: p(O) when the trial begins; the memory's if not given.
         **options: The engine's own keyword options; each has a default.
 
     Raises:
         UnknownNameError: No engine has this name.
-        InvalidInputError: The engine has no such option, or it does not take this value.
+        InvalidInputError: The engine has no such option, it does not take this value, or the prior is not a
+            distribution over the objects of this memory.
     """
     if engine not in ENGINES:
         raise unknown_name("engine", engine, ENGINES)
     check_known(ENGINES[engine], engine, options)
     begin: Callable[..., Inference] = ENGINES[engine]
-    return begin(memory, parameters, **options)
+    return begin(memory, parameters, prior, **options)

@@ -7,7 +7,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from atg_fg.belief import IdentityBelief
+from atg_fg.belief import IdentityBelief, log_of
 from atg_fg.chain import Chain, History, build_chain
 from atg_fg.errors import ImpossibleEvidenceError, InvalidInputError
 from atg_fg.memory import RobotMemory
@@ -24,15 +24,17 @@ class Inference(ABC):
     Args:
         memory: The robot memory when the trial begins; it is not changed.
         parameters: α, δ and whether to learn within the trial.
+        prior: p(O) when the trial begins; the memory's if not given.
     """
 
     name: ClassVar[str]
     exact: ClassVar[bool]
 
-    def __init__(self, memory: RobotMemory, parameters: ModelParameters) -> None:
+    def __init__(self, memory: RobotMemory, parameters: ModelParameters, prior: IdentityBelief | None = None) -> None:
         self.memory = memory
         self.parameters = parameters
-        self.model = RecognitionModel(memory, parameters)
+        self.prior = prior
+        self.model = RecognitionModel(memory, parameters, prior)
         self.history = History()
 
     def observe(self, evidence: Evidence) -> None:
@@ -77,7 +79,8 @@ class Inference(ABC):
 
     def chain(self, hypothesis: int | None = None) -> Chain:
         """Return the trial so far as plain arrays, for all hypotheses or under one of them."""
-        return build_chain(self.memory, self.parameters, self.history, None if hypothesis is None else [hypothesis])
+        hypotheses = None if hypothesis is None else [hypothesis]
+        return build_chain(self.memory, self.parameters, self.history, hypotheses, self.prior)
 
     def _impossible(self) -> ImpossibleEvidenceError:
         """Return the error for a look, the one about to be taken in, that no hypothesis allows."""
@@ -95,6 +98,17 @@ class Inference(ABC):
     def log_evidence(self) -> float:
         """Return ln p(z_0:t | a_1:t)."""
 
+    @property
+    def aspect_belief(self) -> FloatArray:
+        """p(O, X_t | z_0:t, a_1:t), shape [H, W]; after an action X_t is the aspect that it leads to."""
+        if not self.history.evidence:
+            return self.model.prior[:, None] * self.model.base
+        joint = np.zeros((self.model.n_hypotheses, self.model.n_states))
+        identity = self.identity().probabilities
+        for hypothesis in np.flatnonzero(identity):
+            joint[hypothesis] = identity[hypothesis] * self.smoothed_aspects(int(hypothesis))[-1]
+        return joint
+
     def smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
         """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s, each of shape [W_s].
 
@@ -102,12 +116,16 @@ class Inference(ABC):
 
         Raises:
             InvalidInputError: There is no such hypothesis, or nothing was observed yet.
-            ImpossibleEvidenceError: The evidence has probability zero under this hypothesis.
+            ImpossibleEvidenceError: The hypothesis or the evidence under it has probability zero.
         """
         if not 0 <= hypothesis < self.model.n_hypotheses:
             raise InvalidInputError(f"hypothesis: {hypothesis}; expected 0 to {self.model.n_hypotheses - 1}")
         if not self.history.evidence:
             raise InvalidInputError("smoothed aspects: nothing observed yet; expected a first observation")
+        if not self.model.prior[hypothesis] > 0:
+            raise ImpossibleEvidenceError(
+                f"smoothed aspects: hypothesis {hypothesis} has prior probability zero; expected one that is possible"
+            )
         marginals = self._smoothed_aspects(hypothesis)
         if not all(marginal.sum() > 0 for marginal in marginals):
             raise ImpossibleEvidenceError(
@@ -151,9 +169,9 @@ class FilterInference(Inference):
     back when the evidence turns, where a plain product would have underflowed to zero.
     """
 
-    def __init__(self, memory: RobotMemory, parameters: ModelParameters) -> None:
-        super().__init__(memory, parameters)
-        self._belief = _State(np.log(self.model.prior), self.model.base)
+    def __init__(self, memory: RobotMemory, parameters: ModelParameters, prior: IdentityBelief | None = None) -> None:
+        super().__init__(memory, parameters, prior)
+        self._belief = _State(log_of(self.model.prior), self.model.base)
         self._log_evidence = 0.0
 
     def identity(self) -> IdentityBelief:
@@ -175,9 +193,7 @@ class FilterInference(Inference):
         joint = self._correct(self._belief.aspects, likelihood)
         given_object = joint.sum(axis=1)
         possible = given_object > 0
-        log_joint = self._belief.log_identity + np.log(
-            given_object, out=np.full_like(given_object, -np.inf), where=possible
-        )
+        log_joint = self._belief.log_identity + log_of(given_object)
         peak = log_joint.max()
         if not np.isfinite(peak):
             raise self._impossible()

@@ -30,8 +30,8 @@ class Enumeration(Inference):
     name: ClassVar[str] = "enumeration"
     exact: ClassVar[bool] = True
 
-    def __init__(self, memory: RobotMemory, parameters: ModelParameters) -> None:
-        super().__init__(memory, parameters)
+    def __init__(self, memory: RobotMemory, parameters: ModelParameters, prior: IdentityBelief | None = None) -> None:
+        super().__init__(memory, parameters, prior)
         self.weights: FloatArray = self.model.prior[:, None] * self.model.base
         self._log_scale = 0.0
 

@@ -12,6 +12,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from atg_fg.belief import IdentityBelief
 from atg_fg.chain import Chain, ForwardPass, forward_pass
 from atg_fg.engines.options import whole_number
 from atg_fg.engines.sampling import drawn, split_r_hat
@@ -48,6 +49,7 @@ class GibbsSampling(WholeTrialInference):
     Args:
         memory: The robot memory when the trial begins; it is not changed.
         parameters: α, δ and whether to learn within the trial.
+        prior: p(O) when the trial begins; the memory's if not given.
         n_chains: Number of chains, begun at objects drawn from the proposal.
         n_sweeps: Sweeps of each chain that are kept.
         n_burn_in: Sweeps of each chain before these.
@@ -64,13 +66,14 @@ class GibbsSampling(WholeTrialInference):
         self,
         memory: RobotMemory,
         parameters: ModelParameters,
+        prior: IdentityBelief | None = None,
         *,
         n_chains: int = 8,
         n_sweeps: int = 1000,
         n_burn_in: int = 500,
         seed: int = 0,
     ) -> None:
-        super().__init__(memory, parameters)
+        super().__init__(memory, parameters, prior)
         self.n_chains = whole_number("n_chains", n_chains, 2)
         self.n_sweeps = whole_number("n_sweeps", n_sweeps, 4)
         self.n_burn_in = whole_number("n_burn_in", n_burn_in, 0)

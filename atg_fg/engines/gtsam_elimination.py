@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atg_fg import factors
+from atg_fg.belief import IdentityBelief
 from atg_fg.engines.base import FilterInference
 from atg_fg.expected_entropy import NextPatternJoint, Targets, expected_entropies
 from atg_fg.factors import HYPOTHETICAL_KEY, Factor
@@ -33,8 +34,8 @@ class GtsamElimination(FilterInference):
     name: ClassVar[str] = "gtsam"
     exact: ClassVar[bool] = True
 
-    def __init__(self, memory: RobotMemory, parameters: ModelParameters) -> None:
-        super().__init__(memory, parameters)
+    def __init__(self, memory: RobotMemory, parameters: ModelParameters, prior: IdentityBelief | None = None) -> None:
+        super().__init__(memory, parameters, prior)
         self._hypothetical: tuple[Targets, list[Factor]] | None = None
 
     def graph(self) -> RecognitionGraph:

@@ -15,6 +15,7 @@ import gtsam
 import numpy as np
 
 from atg_fg import factors
+from atg_fg.belief import IdentityBelief
 from atg_fg.chain import Chain
 from atg_fg.engines.options import one_of
 from atg_fg.engines.whole_trial import Posterior, WholeTrialInference, joint_of
@@ -73,8 +74,8 @@ class GtsamRoute(WholeTrialInference):
 
     exact: ClassVar[bool] = True
 
-    def __init__(self, memory: RobotMemory, parameters: ModelParameters) -> None:
-        super().__init__(memory, parameters)
+    def __init__(self, memory: RobotMemory, parameters: ModelParameters, prior: IdentityBelief | None = None) -> None:
+        super().__init__(memory, parameters, prior)
         self.ordering = "colamd"
 
     @property
@@ -139,14 +140,22 @@ class _OrderedRoute(GtsamRoute):
     Args:
         memory: The robot memory when the trial begins; it is not changed.
         parameters: α, δ and whether to learn within the trial.
+        prior: p(O) when the trial begins; the memory's if not given.
         ordering: A name in ``ORDERINGS``.
 
     Raises:
         InvalidInputError: There is no such ordering.
     """
 
-    def __init__(self, memory: RobotMemory, parameters: ModelParameters, *, ordering: str = "objects-last") -> None:
-        super().__init__(memory, parameters)
+    def __init__(
+        self,
+        memory: RobotMemory,
+        parameters: ModelParameters,
+        prior: IdentityBelief | None = None,
+        *,
+        ordering: str = "objects-last",
+    ) -> None:
+        super().__init__(memory, parameters, prior)
         self.ordering = one_of("ordering", ordering, ORDERINGS)
 
 

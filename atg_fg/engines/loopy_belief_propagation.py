@@ -12,7 +12,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from atg_fg.belief import log_sum_exp
+from atg_fg.belief import IdentityBelief, log_of, log_sum_exp
 from atg_fg.chain import Chain
 from atg_fg.engines.options import number_between, one_of, whole_number
 from atg_fg.engines.whole_trial import Posterior, WholeTrialInference, joint_of
@@ -46,6 +46,7 @@ class LoopyBeliefPropagation(WholeTrialInference):
     Args:
         memory: The robot memory when the trial begins; it is not changed.
         parameters: α, δ and whether to learn within the trial.
+        prior: p(O) when the trial begins; the memory's if not given.
         damping: Share of the old message in each new one, from 0 to below 1; not used on a tree.
         schedule: ``sequential``, forwards and backwards through time and then to O, or ``parallel``, all at once.
         max_iterations: Most sweeps.
@@ -62,13 +63,14 @@ class LoopyBeliefPropagation(WholeTrialInference):
         self,
         memory: RobotMemory,
         parameters: ModelParameters,
+        prior: IdentityBelief | None = None,
         *,
         damping: float = 0.3,
         schedule: str = "sequential",
         max_iterations: int = 500,
         tolerance: float = 1e-10,
     ) -> None:
-        super().__init__(memory, parameters)
+        super().__init__(memory, parameters, prior)
         self.damping = number_between("damping", damping, 0.0, 1.0)
         self.schedule = one_of("schedule", schedule, SCHEDULES)
         self.max_iterations = whole_number("max_iterations", max_iterations, 1)
@@ -117,7 +119,7 @@ class Messages:
 
     def __init__(self, chain: Chain, damping: float) -> None:
         self._damping = damping
-        self._log_prior = np.log(chain.prior)
+        self._log_prior = log_of(chain.prior)
         # ψ_0 as [H, 1, W_0], as if X_0 came from a variable with one state.
         incoming = [chain.initial[:, None, :], *chain.transitions]
         observed = [*chain.likelihoods, np.ones((1, 1))][: len(incoming)]
@@ -156,7 +158,7 @@ class Messages:
 
     def identity(self) -> FloatArray:
         """Return the belief in O, shape [H]."""
-        logarithms = self._log_prior + _log(self.to_object).sum(axis=0)
+        logarithms = self._log_prior + log_of(self.to_object).sum(axis=0)
         belief: FloatArray = np.exp(logarithms - log_sum_exp(logarithms))
         return belief
 
@@ -173,14 +175,14 @@ class Messages:
         """
         last = len(self._factors) - 1
         given = self._log_from_object()
-        factors = sum(log_sum_exp(given[s] + _log(self._to_object(s))) for s in range(last + 1))
-        objects = log_sum_exp(self._log_prior + _log(self.to_object).sum(axis=0))
+        factors = sum(log_sum_exp(given[s] + log_of(self._to_object(s))) for s in range(last + 1))
+        objects = log_sum_exp(self._log_prior + log_of(self.to_object).sum(axis=0))
         overlaps = np.array([past @ future for past, future in zip(self.forward[:-1], self.backward[:-1], strict=True)])
-        return float(factors - last * objects - _log(overlaps).sum())
+        return float(factors - last * objects - log_of(overlaps).sum())
 
     def _log_from_object(self) -> FloatArray:
         """Logarithm of the message from O to each factor: what all the others told O, shape [T + 1, H]."""
-        told = _log(self.to_object)
+        told = log_of(self.to_object)
         nothing = np.zeros_like(told[:1])
         # Sums before and after each factor: a difference of sums would be undefined where an object is ruled out.
         before = np.concatenate((nothing, np.cumsum(told[:-1], axis=0)))
@@ -218,7 +220,3 @@ class Messages:
         message = np.where(message > 0, (1.0 - self._damping) * message + self._damping * old, 0.0)
         message /= message.sum()
         return message, float(np.abs(message - old).max())
-
-
-def _log(values: FloatArray) -> FloatArray:
-    return np.log(values, out=np.full_like(values, -np.inf), where=values > 0)

@@ -60,6 +60,7 @@ class MeanField(SupportedInference):
     Args:
         memory: The robot memory when the trial begins; it is not changed.
         parameters: α, δ and whether to learn within the trial.
+        prior: p(O) when the trial begins; the memory's if not given.
         floor: Least J that a logarithm is taken of, relative to the greatest.
         max_iterations: Most sweeps a look.
         tolerance: Fall of the free energy in nats that counts as none.
@@ -80,12 +81,13 @@ class MeanField(SupportedInference):
         self,
         memory: RobotMemory,
         parameters: ModelParameters,
+        prior: IdentityBelief | None = None,
         *,
         floor: float = 1e-16,
         max_iterations: int = 200,
         tolerance: float = 1e-10,
     ) -> None:
-        super().__init__(memory, parameters)
+        super().__init__(memory, parameters, prior)
         self.floor = number_between("floor", floor, 1e-300, 1e-3)
         self.max_iterations = whole_number("max_iterations", max_iterations, 1)
         self.tolerance = number_between("tolerance", tolerance, 0.0, 1.0)
@@ -105,9 +107,14 @@ class MeanField(SupportedInference):
         """Return −Σ F over the looks."""
         return self._log_evidence
 
+    @property
+    def aspect_belief(self) -> FloatArray:
+        """q(O) q(X_t), shape [H, W]; after an action, what the next look finds."""
+        return self._predicted if self.history.awaits_evidence else np.outer(self.objects, self.aspects)
+
     def _expected_entropies(self) -> FloatArray:
         """Return eq. 3 for each action, shape [A], exactly so for q(O) q(X_t)."""
-        return expected_entropies_of(self.model, np.outer(self.objects, self.aspects))
+        return expected_entropies_of(self.model, self.aspect_belief)
 
     def _smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
         """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s by forward-backward."""

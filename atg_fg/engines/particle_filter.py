@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from atg_fg.belief import IdentityBelief, log_sum_exp
+from atg_fg.belief import IdentityBelief, log_of, log_sum_exp
 from atg_fg.chain import forward_pass
 from atg_fg.engines.bayes_filter import forward_backward
 from atg_fg.engines.options import whole_number
@@ -35,6 +35,7 @@ class ParticleFilter(SupportedInference):
     Args:
         memory: The robot memory when the trial begins; it is not changed.
         parameters: α, δ and whether to learn within the trial.
+        prior: p(O) when the trial begins; the memory's if not given.
         n_particles: Number of particles.
         seed: Seed of the filter's own generator.
 
@@ -52,9 +53,15 @@ class ParticleFilter(SupportedInference):
     exact: ClassVar[bool] = False
 
     def __init__(
-        self, memory: RobotMemory, parameters: ModelParameters, *, n_particles: int = 2000, seed: int = 0
+        self,
+        memory: RobotMemory,
+        parameters: ModelParameters,
+        prior: IdentityBelief | None = None,
+        *,
+        n_particles: int = 2000,
+        seed: int = 0,
     ) -> None:
-        super().__init__(memory, parameters)
+        super().__init__(memory, parameters, prior)
         self.n_particles = whole_number("n_particles", n_particles, 1)
         self._rng = np.random.default_rng(whole_number("seed", seed, 0))
         self.objects: IntArray = np.zeros(0, dtype=np.int64)
@@ -81,11 +88,21 @@ class ParticleFilter(SupportedInference):
         """Return the estimate of ln p(z_0:t | a_1:t)."""
         return self._log_evidence
 
-    def _expected_entropies(self) -> FloatArray:
-        """Return eq. 3 for each action, shape [A], exactly so for the belief that the particles are."""
+    @property
+    def aspect_belief(self) -> FloatArray:
+        """The weight of the particles at each (O, X_t), shape [H, W]; after an action, where they are about to go."""
+        if not len(self.weights):
+            return super().aspect_belief
         mass = np.zeros((self.model.n_hypotheses, self.model.n_states))
         np.add.at(mass, (self.objects, self.aspects), self.weights)
-        return expected_entropies_of(self.model, mass)
+        if self._transition is None or not self.history.awaits_evidence:
+            return mass
+        predicted: FloatArray = np.matmul(mass[:, None, :], self._transition)[:, 0, :]
+        return predicted
+
+    def _expected_entropies(self) -> FloatArray:
+        """Return eq. 3 for each action, shape [A], exactly so for the belief that the particles are."""
+        return expected_entropies_of(self.model, self.aspect_belief)
 
     def _smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
         """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s by forward-backward."""
@@ -141,7 +158,7 @@ class ParticleFilter(SupportedInference):
         log_prior = past.log_joint - log_sum_exp(past.log_joint)
         given = past.filtered[-1] * likelihood
         total = given.sum(axis=1)
-        logarithms = log_prior + np.log(total, out=np.full_like(total, -np.inf), where=total > 0)
+        logarithms = log_prior + log_of(total)
         log_probability = log_sum_exp(logarithms)
         self._draw(np.exp(logarithms - log_probability)[:, None] * given / np.where(total > 0, total, 1.0)[:, None])
         self._log_evidence += log_probability

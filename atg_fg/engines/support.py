@@ -7,6 +7,7 @@ from abc import abstractmethod
 import numpy as np
 from numpy.typing import NDArray
 
+from atg_fg.belief import IdentityBelief
 from atg_fg.engines.base import Inference
 from atg_fg.memory import RobotMemory
 from atg_fg.model import Revelation
@@ -24,8 +25,8 @@ class SupportedInference(Inference):
         support: Whether p(O, X_t | z_0:t, a_1:t) > 0, shape [H, W].
     """
 
-    def __init__(self, memory: RobotMemory, parameters: ModelParameters) -> None:
-        super().__init__(memory, parameters)
+    def __init__(self, memory: RobotMemory, parameters: ModelParameters, prior: IdentityBelief | None = None) -> None:
+        super().__init__(memory, parameters, prior)
         self.support: NDArray[np.bool_] = (self.model.prior[:, None] * self.model.base) > 0
 
     def _update(self, likelihood: FloatArray) -> None:

@@ -34,8 +34,8 @@ class Posterior(NamedTuple):
 class WholeTrialInference(SupportedInference):
     """Engines that make a ``Posterior`` of the trial's chain at the first question after a step, and keep it."""
 
-    def __init__(self, memory: RobotMemory, parameters: ModelParameters) -> None:
-        super().__init__(memory, parameters)
+    def __init__(self, memory: RobotMemory, parameters: ModelParameters, prior: IdentityBelief | None = None) -> None:
+        super().__init__(memory, parameters, prior)
         self._posterior: Posterior | None = None
 
     @property
@@ -55,6 +55,11 @@ class WholeTrialInference(SupportedInference):
         """Return ln p(z_0:t | a_1:t), or what the engine takes it to be."""
         return self.posterior.log_evidence
 
+    @property
+    def aspect_belief(self) -> FloatArray:
+        """p(O, X_t | z_0:t, a_1:t), shape [H, W], or what the engine takes it to be."""
+        return self.posterior.joint
+
     def _prior(self) -> Posterior:
         return Posterior(self.model.prior, self.model.prior[:, None] * self.model.base, 0.0)
 
@@ -65,7 +70,7 @@ class WholeTrialInference(SupportedInference):
 
     def _expected_entropies(self) -> FloatArray:
         """Return eq. 3 for each action, shape [A], exactly so for the engine's own p(O, X_t)."""
-        return expected_entropies_of(self.model, self.posterior.joint)
+        return expected_entropies_of(self.model, self.aspect_belief)
 
     def _condition(self, likelihood: FloatArray) -> None:
         self._posterior = None
