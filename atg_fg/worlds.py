@@ -102,12 +102,7 @@ class ARcubeWorld(gymnasium.Env[IntArray, np.int64]):
     ) -> tuple[IntArray, dict[str, Any]]:
         """Present an object in an orientation, both drawn at random unless ``options`` sets them."""
         super().reset(seed=seed)
-        options = options or {}
-        for name in options:
-            if name not in ("object", "orientation"):
-                raise unknown_name("reset option", name, ("object", "orientation"))
-        self.object = self._chosen(options, "object", len(self.cubes))
-        self.orientation = self._chosen(options, "orientation", len(ORIENTATIONS))
+        self._present(options or {})
         self._place()
         return self._look(), self._truth(slipped=False)
 
@@ -120,6 +115,14 @@ class ARcubeWorld(gymnasium.Env[IntArray, np.int64]):
             self.orientation = SUCCESSORS[self.orientation][int(action)]
         self._place()
         return self._look(), 0.0, False, False, self._truth(slipped=slipped)
+
+    def _present(self, options: dict[str, Any]) -> None:
+        """Choose what is presented, by the options of a reset or at random."""
+        for name in options:
+            if name not in ("object", "orientation"):
+                raise unknown_name("reset option", name, ("object", "orientation"))
+        self.object = self._chosen(options, "object", len(self.cubes))
+        self.orientation = self._chosen(options, "orientation", len(ORIENTATIONS))
 
     def _chosen(self, options: dict[str, Any], name: str, n: int) -> int:
         if name not in options:

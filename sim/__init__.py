@@ -44,6 +44,13 @@ def make_robonaut_arcube(**options: Any) -> gymnasium.Env[Any, Any]:
     return RobonautARcubeWorld(**options)
 
 
+def make_robonaut_table(**options: Any) -> gymnasium.Env[Any, Any]:
+    """Return a ``sim.robot.table_world.RobonautTableWorld``; its module is imported only now."""
+    from sim.robot.table_world import RobonautTableWorld
+
+    return RobonautTableWorld(**options)
+
+
 def import_quietly(module: str) -> None:
     """Import a module that prints a banner from C on standard error, without the banner.
 
@@ -64,3 +71,4 @@ def import_quietly(module: str) -> None:
 
 gymnasium.register(id="sim/RenderedARcube-v0", entry_point="sim:make_rendered_arcube")
 gymnasium.register(id="sim/RobonautARcube-v0", entry_point="sim:make_robonaut_arcube")
+gymnasium.register(id="sim/RobonautTable-v0", entry_point="sim:make_robonaut_table")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -61,6 +61,11 @@ class Camera:
         right = np.cross(forward, self._up)
         right = right / np.linalg.norm(right)
         return np.column_stack([right, np.cross(forward, right), forward])
+
+    def moved(self, by: FloatArray) -> Camera:
+        """Return the camera moved by a vector of shape [3], m."""
+        eye, target = np.add(self.eye, by).tolist(), np.add(self.target, by).tolist()
+        return replace(self, eye=tuple(eye), target=tuple(target))
 
     def render(self, client: int, light: Light, *, shadow: bool = False) -> NDArray[np.uint8]:
         """Return what the camera sees, RGB, shape [height, width, 3]; shadows are for people, and slow."""

@@ -74,18 +74,21 @@ def quaternion_of(rotation: FloatArray) -> tuple[float, float, float, float]:
 class CubeBody:
     """One cube in a PyBullet client; its tags can be changed to those of another cube.
 
-    Textures are loaded once a client, since PyBullet never frees one.
+    Textures are loaded once a client, since PyBullet never frees one: further cubes take those of the first.
 
     Args:
         client: PyBullet's physics client id.
         mass: Kilograms; a cube without one is a picture that nothing moves or touches.
+        like: Another cube in the same client, whose textures to take.
     """
 
-    def __init__(self, client: int, mass: float = 0.0) -> None:
+    def __init__(self, client: int, mass: float = 0.0, like: CubeBody | None = None) -> None:
         self.client = client
         # PyBullet reads meshes and textures when they are created; the files are not needed afterwards.
         with tempfile.TemporaryDirectory(prefix="arcube-") as folder:
-            self._textures = [self._load_texture(symbol, Path(folder)) for symbol in range(N_TAGS)]
+            self._textures: list[int] = (
+                like._textures if like else [self._load_texture(symbol, Path(folder)) for symbol in range(N_TAGS)]
+            )
             meshes = [_write_face(face, Path(folder)) for face in range(len(FACE_NORMALS))]
             shape = pybullet.createVisualShapeArray(
                 shapeTypes=[pybullet.GEOM_MESH] * len(meshes),

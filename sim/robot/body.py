@@ -15,6 +15,7 @@ from atg_fg.errors import InvalidInputError
 from atg_fg.patterns import FloatArray
 from sim.cube_body import quaternion_of
 from sim.robot.description import Description, read_description
+from sim.robot.rail import Rail, on_rail
 from sim.robot.shell import EYE, EYE_TILT
 from sim.robot.table import NECK, SIDES, WAIST, arm, arm_joint_names
 from sim.robot.urdf import write_robot
@@ -24,26 +25,35 @@ _NECK_POSTURE: Final = (0.10, 0.0, -0.65)
 #: Links along an arm nearer than this cannot hit each other; their shapes overlap at the joint.
 _NEIGHBOURS: Final = 3
 _JOINT_DAMPING: Final = 0.1  # N·m·s/rad
+#: Joint angles of both arms with the hands raised before the shoulders, clear of all that stands on tables, rad.
+TUCKED_POSTURE: Final[FloatArray] = np.tile([-0.06, 0.0, -2.35, -2.60, 2.11, 0.48, -0.03], (2, 1))
 #: Joint angles of both arms with the hands beside the cube, rad: within the joints' limits all through a flip.
 HOME_POSTURE: Final[FloatArray] = np.tile([0.245, -0.483, -1.357, -2.167, 2.198, 0.127, 0.050], (2, 1))
 
 
 class RobotBody:
-    """The robot in a PyBullet client, its waist at the world's origin.
+    """The robot in a PyBullet client, its waist at the world's origin, or beside it on a rail.
 
     Args:
         client: PyBullet's physics client id.
         urdf: A user's own description with the joint names of NASA's Robonaut 2, instead of the shell.
+        rail_reach: How far the robot can slide to its left and right, m; without it, the robot stands still.
+
+    Attributes:
+        rail: What it slides on, if it does.
 
     Raises:
         InvalidInputError: The description cannot be read or lacks a joint.
     """
 
-    def __init__(self, client: int, urdf: Path | None = None) -> None:
+    def __init__(self, client: int, urdf: Path | None = None, rail_reach: float | None = None) -> None:
         self.client = client
         with tempfile.TemporaryDirectory(prefix="robonaut-") as folder:
             description = read_description(urdf if urdf is not None else write_robot(Path(folder)))
+            if rail_reach is not None:
+                description = on_rail(description, Path(folder), rail_reach)
             self.body = self._load(description)
+        self.rail = None if rail_reach is None else Rail(client, self.body)
         self.kinematics = description.kinematics()
         upright = np.array_equal(description.base_rotation, np.eye(3))
         self._base_rotation = None if upright else description.base_rotation
@@ -138,13 +148,18 @@ class RobotBody:
             )
 
     def eye(self) -> tuple[FloatArray, FloatArray]:
-        """Return where the camera's eye is (m) and which way it looks (a unit vector), each of shape [3]."""
+        """Return where the camera's eye is and which way it looks in the robot's frame: m, unit vector, shape [3]."""
         head = self.joints[NECK[-1].name]
         place, turn = pybullet.getLinkState(self.body, head, computeForwardKinematics=1, physicsClientId=self.client)[
             4:6
         ]
         rotation = np.array(pybullet.getMatrixFromQuaternion(turn)).reshape(3, 3)
-        return np.array(place) + rotation @ self._eye, rotation @ self._look
+        return np.array(place) + rotation @ self._eye - self.place, rotation @ self._look
+
+    @property
+    def place(self) -> FloatArray:
+        """Where the robot's frame is in the world, as the rail measures it, shape [3], m."""
+        return np.array([0.0, 0.0 if self.rail is None else self.rail.position, 0.0])
 
     def contact_force(self, side: int, body: int) -> float:
         """Return the normal force between a hand (0 left, 1 right) and another body, N."""

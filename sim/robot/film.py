@@ -12,7 +12,7 @@ from sim.camera import Camera, Light
 from sim.robot.controller import TIME_STEP
 from sim.robot.scene import Scene
 
-#: Beside the table, looking at the robot.
+#: Beside the table, looking at a robot at the world's origin.
 OBSERVER: Final = Camera((1.50, 0.90, 0.95), (0.17, 0.02, 0.41), 42.0, (480, 360))
 _LIGHT: Final = Light((1.2, 0.9, 2.2), ambient=0.55, diffuse=0.45)
 _INSET_SHARE: Final = 0.3
@@ -49,12 +49,14 @@ class Film:
         self._every = max(1, round(SPEED / fps / TIME_STEP))
         self._pictures: list[NDArray[np.uint8]] = []
 
-    def begin(self, scene: Scene, inset: Callable[[], NDArray[np.uint8]]) -> None:
-        """Film a scene from now on, with the picture that ``inset`` returns in the corner."""
+    def begin(
+        self, scene: Scene, inset: Callable[[], NDArray[np.uint8]], observer: Callable[[], Camera] = lambda: OBSERVER
+    ) -> None:
+        """Film a scene from now on as ``observer`` sees it, with the picture that ``inset`` returns in the corner."""
 
         def shoot() -> None:
             if scene.steps % self._every == 0:
-                self._pictures.append(with_inset(observed(scene, OBSERVER), inset()))
+                self._pictures.append(with_inset(observed(scene, observer()), inset()))
 
         scene.on_step = shoot
 

@@ -12,8 +12,8 @@ from atg_fg.errors import AtgError
 from atg_fg.patterns import FloatArray
 from sim.cube_body import CUBE_CENTRE
 from sim.robot import plans
-from sim.robot.body import HOME_POSTURE, RobotBody
-from sim.robot.controller import ArmController, JointTarget
+from sim.robot.body import HOME_POSTURE, TUCKED_POSTURE, RobotBody
+from sim.robot.controller import TIME_STEP, ArmController, JointTarget
 from sim.robot.inverse_kinematics import Solution, solve
 from sim.robot.kinematics import cross
 from sim.robot.plans import INWARD, CubePose, Waypoint
@@ -121,7 +121,19 @@ class Manipulator:
 
     def go_home(self) -> None:
         """Take the hands back to the cube's sides, clear of it."""
-        self.controller.run([JointTarget(HOME_POSTURE, self.robot.gravity_torques(HOME_POSTURE), 0.3, still=0.1)])
+        self._take_arms_to(HOME_POSTURE)
+
+    def slide(self, place: float) -> None:
+        """Raise the arms, slide to ``place`` (m to the left of the rail's middle), and take the hands home there."""
+        if self.robot.rail is None:
+            return
+        self._take_arms_to(TUCKED_POSTURE)
+        for _ in self.robot.rail.ride(place):
+            self.controller.hold(TIME_STEP)
+        self.go_home()
+
+    def _take_arms_to(self, posture: FloatArray) -> None:
+        self.controller.run([JointTarget(posture, self.robot.gravity_torques(posture), 0.3, still=0.1)])
 
 
 def _rolling(before: FloatArray, after: FloatArray) -> FloatArray:

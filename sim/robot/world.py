@@ -6,9 +6,10 @@ import copy
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, cast
 
 import numpy as np
+from gymnasium import spaces
 from numpy.typing import NDArray
 
 from atg_fg.arcube import ACTION_SOURCES, SUCCESSORS, Cube, shown_pattern
@@ -25,7 +26,7 @@ from sim.robot.film import OBSERVER, Film, observed
 from sim.robot.manipulation import Manipulator, OutOfReachError
 from sim.robot.perception import cube_pose
 from sim.robot.plans import CubePose
-from sim.robot.scene import Scene
+from sim.robot.scene import PlacedCube, Scene
 
 #: An action is right if it leaves the cube this near to where it should, degrees and m.
 RIGHT_ANGLE: Final = 20.0
@@ -74,6 +75,7 @@ class RobonautARcubeWorld(ARcubeWorld):
         frame: The last frame of the head's camera, RGB, shape [height, width, 3].
         markers: What was detected in it.
         circumstances: What was drawn for this trial.
+        camera: The head's, in the robot's frame.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012 - gymnasium declares it so
@@ -107,29 +109,20 @@ class RobonautARcubeWorld(ARcubeWorld):
         self._outcome: dict[str, Any] = {}
         self._film = Film(self.metadata["render_fps"]) if render_mode == "rgb_array_list" else None
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[IntArray, dict[str, Any]]:
-        """Stand a cube on the table; object and orientation are drawn at random unless ``options`` sets them."""
-        options = dict(options or {})
-        self._position = _checked_position(options.pop("position", CUBE_CENTRE[:2]))
-        return super().reset(seed=seed, options=options)
-
     def step(self, action: np.int64) -> tuple[IntArray, float, bool, bool, dict[str, Any]]:
         """Let the robot act and look.
 
         Raises:
             InvalidInputError: Not an action, or the cube is lost and the world was not reset.
         """
-        if not self.action_space.contains(action):
-            raise InvalidInputError(f"action: {action!r}; expected 0 to {len(_ACTIONS) - 1}")
+        self._check_action(action)
         if self.lost:
             raise InvalidInputError("step: the cube is lost; expected a reset first")
         before, begun, squarings = self.orientation, self.scene.seconds, self.manipulator.squarings
         self.scene.peak_force = 0.0
         reachable = self._try(_ACTIONS[int(action)])
         self.lost = not reachable or self.scene.has_lost_the_cube()
-        self.orientation, _ = nearest_orientation(self.scene.cube.pose()[1])
+        self.orientation, _ = nearest_orientation(self.scene.cube_pose()[1])
         self._outcome = {
             **self._score(SUCCESSORS[before][int(action)]),
             "peak_force": self.scene.peak_force,
@@ -141,7 +134,7 @@ class RobonautARcubeWorld(ARcubeWorld):
     def render(self) -> Any:
         """Return a picture, RGB, shape [height, width, 3], or a film as a list of them; ``None`` without a mode."""
         if self.render_mode == "rgb_array":
-            return observed(self.scene, OBSERVER)
+            return observed(self.scene, self._observer())
         if self.render_mode == "head":
             return self.frame.copy()
         if self.render_mode == "detections":
@@ -160,13 +153,8 @@ class RobonautARcubeWorld(ARcubeWorld):
         """
         if snapshot.scene is not self.scene:
             raise InvalidInputError("restore: the state is of another trial; expected one kept since the last reset")
-        kept = copy.deepcopy(snapshot.world)
-        self.orientation, self.lost = kept["orientation"], kept["lost"]
         self.scene.restore(snapshot.state)
-        self.scene.steps, self._seen_at = kept["steps"], kept["seen_at"]
-        self.controller.reference, self.controller.feedforward = kept["reference"], kept["feedforward"]
-        self.frame, self.markers, self._outcome = kept["frame"], kept["markers"], kept["outcome"]
-        self.np_random = kept["generator"]
+        self._set_state(copy.deepcopy(snapshot.world))
 
     def close(self) -> None:
         """Leave PyBullet; the world cannot be used any more."""
@@ -186,6 +174,22 @@ class RobonautARcubeWorld(ARcubeWorld):
             "generator": self.np_random,
         }
 
+    def _set_state(self, kept: dict[str, Any]) -> None:
+        self.orientation, self.lost = kept["orientation"], kept["lost"]
+        self.scene.steps, self._seen_at = kept["steps"], kept["seen_at"]
+        self.controller.reference, self.controller.feedforward = kept["reference"], kept["feedforward"]
+        self.frame, self.markers, self._outcome = kept["frame"], kept["markers"], kept["outcome"]
+        self.np_random = kept["generator"]
+
+    def _check_action(self, action: np.int64) -> None:
+        if not self.action_space.contains(action):
+            n_actions = cast(spaces.Discrete, self.action_space).n
+            raise InvalidInputError(f"action: {action!r}; expected 0 to {n_actions - 1}")
+
+    def _present(self, options: dict[str, Any]) -> None:
+        self._position = _checked_position(options.get("position", CUBE_CENTRE[:2]))
+        super()._present({name: chosen for name, chosen in options.items() if name != "position"})
+
     def _place(self) -> None:
         """Begin a trial: draw its circumstances and stand the cube on the table."""
         self.scene.close()
@@ -195,14 +199,17 @@ class RobonautARcubeWorld(ARcubeWorld):
         self.controller.hold(_SETTLING)
         self.camera = self._head_camera()
         if self._film is not None:
-            self._film.begin(self.scene, self._inset)
+            self._film.begin(self.scene, self._inset, self._observer)
 
     def _build(self) -> None:
         """Make the scene anew, and the robot's control of it."""
-        rotation = rotation_of(self.orientation)
-        self.scene = Scene(self.circumstances, self.cubes[self.object], self._position, rotation, self._urdf)
+        self.scene = Scene(self.circumstances, self._placed_cubes(), self._urdf)
         self.controller = ArmController(self.scene.robot, self.scene.advance)
         self.manipulator = Manipulator(self.controller, self._look_for_cube)
+
+    def _placed_cubes(self) -> list[PlacedCube]:
+        """Return what stands at each station when a trial begins."""
+        return [PlacedCube(self.cubes[self.object], self._position, rotation_of(self.orientation))]
 
     def _try(self, action: str) -> bool:
         """Carry an action out; return whether the robot could reach the cube."""
@@ -215,7 +222,7 @@ class RobonautARcubeWorld(ARcubeWorld):
 
     def _score(self, expected_orientation: int) -> dict[str, Any]:
         """Return how near the cube is to where the action should have left it."""
-        position, rotation = self.scene.cube.pose()
+        position, rotation = self.scene.cube_pose()
         between = rotation @ rotation_of(expected_orientation).T
         angle = float(np.degrees(np.arccos(np.clip((np.trace(between) - 1) / 2, -1, 1))))
         distance = float(np.linalg.norm(position - CUBE_CENTRE))
@@ -234,7 +241,8 @@ class RobonautARcubeWorld(ARcubeWorld):
         """Take a frame with the head's camera, unless nothing has moved since the last one."""
         if self._seen_at == self.scene.steps:
             return
-        self.frame = self.circumstances.imaging.frame(self.camera, self.scene.client, self.np_random)
+        camera = self.camera.moved(self.scene.robot.place)
+        self.frame = self.circumstances.imaging.frame(camera, self.scene.client, self.np_random)
         self.markers = detect_markers(self.frame, self.camera)
         self._seen_at = self.scene.steps
 
@@ -248,11 +256,14 @@ class RobonautARcubeWorld(ARcubeWorld):
         target = eye + direction
         return Camera(tuple(eye.tolist()), tuple(target.tolist()), _FIELD_OF_VIEW, self._image_size)
 
+    def _observer(self) -> Camera:
+        return OBSERVER
+
     def _inset(self) -> NDArray[np.uint8]:
         return draw_detections(self.frame, self.markers)
 
     def _truth(self, *, slipped: bool) -> dict[str, Any]:
-        position, rotation = self.scene.cube.pose()
+        position, rotation = self.scene.cube_pose()
         _, tilt = nearest_orientation(rotation)
         return {
             "object": self.object,

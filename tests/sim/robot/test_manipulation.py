@@ -6,7 +6,7 @@ from sim.robot.conditions import Circumstances
 from sim.robot.controller import ArmController
 from sim.robot.manipulation import Manipulator, OutOfReachError
 from sim.robot.plans import CubePose
-from sim.robot.scene import Scene
+from sim.robot.scene import PlacedCube, Scene
 
 TAGS = (0, 1, 2, 3, 4, 5)
 AT_ITS_PLACE = CubePose(CUBE_CENTRE, 0.0)
@@ -14,7 +14,7 @@ AT_ITS_PLACE = CubePose(CUBE_CENTRE, 0.0)
 
 @pytest.fixture
 def scene():
-    made = Scene(Circumstances(), TAGS, CUBE_CENTRE, rotation_of(0))
+    made = Scene(Circumstances(), [PlacedCube(TAGS, CUBE_CENTRE, rotation_of(0))])
     yield made
     made.close()
 
