@@ -45,6 +45,11 @@ class IdentityBelief:
         """Return the belief with these probabilities of the states of O, shape [K + 1], *unseen* last."""
         return cls(probabilities[:-1], float(probabilities[-1]), n_unseen)
 
+    @classmethod
+    def uniform(cls, n_objects: int, n_unseen: int) -> IdentityBelief:
+        """Return the belief that each of ``n_objects`` remembered and ``n_unseen`` other objects is as probable."""
+        return cls.of(np.append(np.ones(n_objects), n_unseen) / (n_objects + n_unseen), n_unseen)
+
     @property
     def probabilities(self) -> FloatArray:
         """Probability of each state of O, shape [K + 1]: the remembered objects, then *unseen*."""
@@ -69,6 +74,15 @@ class IdentityBelief:
                 "expected none below 0, and sum 1 within 1e-9"
             )
 
+    def with_prior(self, prior: IdentityBelief, instead_of: IdentityBelief) -> IdentityBelief:
+        """Return what the same evidence makes of another prior p(O) than the one that this belief began with.
+
+        An object that the old prior ruled out stays ruled out.
+        """
+        began, wanted = instead_of.probabilities, prior.probabilities
+        weights = np.divide(self.probabilities * wanted, began, out=np.zeros_like(began), where=began > 0)
+        return IdentityBelief.of(weights / weights.sum(), self.n_unseen)
+
     @property
     def is_novel(self) -> bool:
         """Whether the object is judged novel: the probability of *unseen* is above one half."""
@@ -88,3 +102,8 @@ class IdentityBelief:
     def entropy(self) -> float:
         """H(O) in nats, with the unseen objects counted one by one."""
         return max(0.0, float(self.unseen * np.log(self.n_unseen) - x_log_x(self.probabilities).sum()))
+
+    @property
+    def entropy_of_verdict(self) -> float:
+        """H(O) in nats, with *unseen* as one state: what is left to settle before the object is judged."""
+        return max(0.0, -float(x_log_x(self.probabilities).sum()))

@@ -102,6 +102,14 @@ def save_image(image: NDArray[np.uint8], path: Path | str) -> None:
     store.write_bytes_atomically(path, buffer.getvalue())
 
 
+def check_film_path(path: Path | str) -> None:
+    """Raise, before any work is done, what ``save_film`` would raise at the end."""
+    figure_class()
+    if Path(path).suffix.lower() != ".gif":
+        raise InvalidInputError(f"film {str(path)!r}: suffix {Path(path).suffix!r}; expected .gif")
+    store.check_writable(path)
+
+
 def save_film(pictures: Sequence[NDArray[np.uint8]], fps: int, path: Path | str) -> None:
     """Write RGB pictures, each of shape [height, width, 3], as an animated GIF of ``fps`` pictures a second.
 
@@ -109,12 +117,11 @@ def save_film(pictures: Sequence[NDArray[np.uint8]], fps: int, path: Path | str)
         InvalidInputError: No pictures, another suffix than .gif, or a place that cannot be written.
         MissingDependencyError: Pillow, which comes with matplotlib, is not installed.
     """
-    figure_class()
+    check_film_path(path)
     from PIL import Image
 
-    if not pictures or Path(path).suffix.lower() != ".gif":
-        raise InvalidInputError(f"film {str(path)!r}: {len(pictures)} pictures; expected some, and the suffix .gif")
-    store.check_writable(path)
+    if not pictures:
+        raise InvalidInputError(f"film {str(path)!r}: no pictures; expected some")
     # One palette for all pictures, from a few of them, so that what does not move does not flicker.
     sample = np.concatenate(pictures[:: max(1, len(pictures) // 6)])
     palette = Image.fromarray(sample).quantize(_FILM_COLOURS)

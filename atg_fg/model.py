@@ -92,8 +92,9 @@ class RecognitionModel:
         self.n_unseen = memory.n_unseen
         self.n_hypotheses = len(memory) + 1
         graphs = list(memory)
-        self.prior = np.append(np.ones(len(graphs)), self.n_unseen) / (len(graphs) + self.n_unseen)
-        if prior is not None:
+        if prior is None:
+            self.prior = IdentityBelief.uniform(len(graphs), self.n_unseen).probabilities
+        else:
             prior.check(len(graphs), self.n_unseen)
             self.prior = prior.probabilities / prior.probabilities.sum()
         self.n_known = np.array([graph.n_known for graph in graphs] + [0], dtype=np.int64)

@@ -34,6 +34,7 @@ class TrialStep:
         expected_entropies: Of each action in nats, shape [A], if the policy looked at them.
         action: Index of the action chosen next; ``None`` at the end of the trial.
         truth: What the world's ``info`` said, for scoring only.
+        purpose: What the action is for, or why the policy ended the trial, if the policy says so.
     """
 
     detection: Detection
@@ -43,6 +44,7 @@ class TrialStep:
     truth: dict[str, Any]
     expected_entropies: FloatArray | None = None
     action: int | None = None
+    purpose: str | None = None
 
 
 @dataclass
@@ -116,6 +118,7 @@ class TrialRecord:
             "log_evidence": step.log_evidence,
             "expected_entropy": None if expected is None else dict(zip(actions, expected.tolist(), strict=True)),
             "action": None if step.action is None else actions[step.action],
+            **({} if step.purpose is None else {"purpose": step.purpose}),
             "truth": step.truth,
         }
 
@@ -144,7 +147,7 @@ def run_trial(
     reset_options: dict[str, Any] | None = None,
     on_step: Callable[[TrialStep], None] | None = None,
 ) -> TrialRecord:
-    """Look and act ``n_actions`` times, look once more, and return the record.
+    """Look and act ``n_actions`` times, look once more, and return the record; a policy may end it before.
 
     A world that ends the episode ends the trial, with a last look at what it shows; one whose ``info`` says that the
     object is ``lost`` ends it without.
@@ -153,7 +156,7 @@ def run_trial(
         world: A world whose spaces fit the memory's assumptions.
         inference: An engine at the beginning of a trial.
         policy: Chooses the actions.
-        n_actions: Number of actions.
+        n_actions: Number of actions, at most.
         rng: The trial's own generator; the world is seeded from it.
         reset_options: Passed on to the world's ``reset``.
         on_step: Called after every look, with the action already chosen.
@@ -178,11 +181,12 @@ def run_trial(
             truth,
             choice.expected_entropies if choice else None,
             choice.action if choice else None,
+            choice.purpose if choice else None,
         )
         record.steps.append(step)
         if on_step is not None:
             on_step(step)
-        if choice is None:
+        if choice is None or choice.action is None:
             return record
         inference.act(choice.action)
         observation, _, terminated, truncated, truth = world.step(np.int64(choice.action))

@@ -95,23 +95,11 @@ class TrialLog:
 
     def append(self, record: TrialRecord, outcome: TrialOutcome | None = None) -> None:
         """Add a trial to the file, and what is learned from it if that is not what was seen."""
-        line = self._line(record)
+        line = summary_of(record)
         if outcome is not None and outcome.patterns != tuple(record.patterns):
             line["learned"] = outcome.patterns
         with self.path.open("ab") as file:
             file.write(_member(line))
-
-    def _line(self, record: TrialRecord) -> dict[str, Any]:
-        truths = [step.truth for step in record.steps]
-        return {
-            "verdict": record.verdict,
-            "matched": record.matched,
-            "observed": [step.detection for step in record.steps],
-            "actions": [self._assumptions.actions[action] for action in record.actions],
-            "unseen": [step.belief.unseen for step in record.steps],
-            "entropy": [step.belief.entropy for step in record.steps],
-            "truth": truths if record.lost_truth is None else [*truths, record.lost_truth],
-        }
 
     def _outcome(self, line: dict[str, Any]) -> TrialOutcome:
         alphabet, names = self._assumptions.alphabet, self._assumptions.actions
@@ -126,6 +114,22 @@ class TrialLog:
             )
         except (KeyError, IndexError, TypeError, ValueError) as error:
             raise InvalidInputError(f"{self.path}: {error!r}; expected a trial a line") from error
+
+
+def summary_of(record: TrialRecord) -> dict[str, Any]:
+    """Return what is kept of a trial: what was seen and done, what was believed, and the truth."""
+    truths = [step.truth for step in record.steps]
+    purposes = [step.purpose for step in record.steps]
+    return {
+        "verdict": record.verdict,
+        "matched": record.matched,
+        "observed": [step.detection for step in record.steps],
+        "actions": [record.assumptions.actions[action] for action in record.actions],
+        "unseen": [step.belief.unseen for step in record.steps],
+        "entropy": [step.belief.entropy for step in record.steps],
+        **({"purpose": purposes} if any(purposes) else {}),
+        "truth": truths if record.lost_truth is None else [*truths, record.lost_truth],
+    }
 
 
 def read_trials(path: Path) -> list[dict[str, Any]]:

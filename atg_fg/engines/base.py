@@ -10,6 +10,7 @@ import numpy as np
 from atg_fg.belief import IdentityBelief, log_of
 from atg_fg.chain import Chain, History, build_chain
 from atg_fg.errors import ImpossibleEvidenceError, InvalidInputError
+from atg_fg.goal_planning import TransitionGraph, transitions_of_hypothesis
 from atg_fg.memory import RobotMemory
 from atg_fg.model import RecognitionModel, Revelation
 from atg_fg.parameters import ModelParameters
@@ -76,6 +77,10 @@ class Inference(ABC):
         if self.history.awaits_evidence:
             raise InvalidInputError("expected entropy: asked before the look; expected an observation first")
         return self._expected_entropies()
+
+    def transition_graph(self, hypothesis: int) -> TransitionGraph:
+        """Return the known transitions of a hypothesis, for planning; its nodes are the model's states."""
+        return transitions_of_hypothesis(self.model, hypothesis)
 
     def chain(self, hypothesis: int | None = None) -> Chain:
         """Return the trial so far as plain arrays, for all hypotheses or under one of them."""

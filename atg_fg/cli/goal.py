@@ -1,0 +1,160 @@
+"""``atg-fg goal``: objects before the robot are recognised and driven to goal aspects (the paper's Figure 2)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import typer
+from rich.table import Table
+
+from atg_fg import figures
+from atg_fg.cli import options
+from atg_fg.errors import InvalidInputError, unknown_name
+from atg_fg.goal_experiment import COMPLETE, GoalPlan, run_goals, run_many, run_seed
+from atg_fg.goal_scoring import ServedObject, summarise
+from atg_fg.policies import POLICIES
+from atg_fg.policies.goal import PLANNERS
+from atg_fg.presets import preset as preset_named
+from atg_fg.worlds import World
+
+#: How worlds with a camera are filmed: by an observer, or by what is detected at each look.
+RENDER_MODES: Final = {"rendered": "detections", "robonaut": "rgb_array_list"}
+
+
+def goal(
+    world: options.World = "ideal",
+    engine: options.Engine = "gtsam",
+    preset: options.Preset = "default",
+    cubes: Annotated[int, typer.Option(help="Cubes before the robot, each at a station.")] = 3,
+    memory_cubes: Annotated[int, typer.Option(help="Cubes that the memory is learned from, these among them.")] = 20,
+    learning_actions: Annotated[
+        int, typer.Option(help=f"Actions on each cube while the memory is learned; {COMPLETE} makes it complete.")
+    ] = 20,
+    learning_policy: Annotated[str, typer.Option(help=f"Policy then: {', '.join(POLICIES)}.")] = "explore",
+    learning_world: Annotated[str, typer.Option(help="World in which the memory is learned.")] = "ideal",
+    planner: Annotated[str, typer.Option(help=f"How a way is found: {', '.join(PLANNERS)}.")] = "attempts",
+    unreachable: Annotated[
+        str, typer.Option(help="A goal that no known path leads to: declare (say so and stop) or explore.")
+    ] = "declare",
+    trials: Annotated[int, typer.Option(help="Runs, each with a memory, cubes and goals of its own.")] = 20,
+    actions: Annotated[int, typer.Option(help="Actions on each cube, at most.")] = 40,
+    seed: Annotated[int, typer.Option(help="Seed of all runs.")] = 0,
+    slip: options.Slip = 0.0,
+    wrong: options.Wrong = 0.0,
+    missing: options.Missing = 0.0,
+    condition: options.Condition = None,
+    urdf: options.Urdf = None,
+    jobs: options.Jobs = None,
+    records: Annotated[Path | None, typer.Option(help="Folder in which every run is saved as it ends.")] = None,
+    resume: Annotated[bool, typer.Option("--resume", help="Leave out the runs that --records holds.")] = False,
+    video: Annotated[
+        Path | None, typer.Option(help="Film the first run into this .gif: a world with a camera.")
+    ] = None,
+    json_file: options.JsonFile = None,
+) -> None:
+    """Recognise the cubes before the robot, and turn each until it shows its goal.
+
+    Example: atg-fg goal --cubes 3 --memory-cubes 20 --trials 50 --engine bayes-filter
+    """
+    options.check_at_least(1, trials=trials, jobs=jobs)
+    options.check_at_least(0, seed=seed)
+    options.check_json_option(json_file)
+    if resume and records is None:
+        raise InvalidInputError("--resume: no records to go on from; expected --records with their folder")
+    if video is not None:
+        if world not in RENDER_MODES:
+            raise unknown_name("--video: world with a camera", world, RENDER_MODES)
+        figures.check_film_path(video)
+    world_options = options.world_options(slip, wrong, missing, condition, urdf)
+    plan = GoalPlan(
+        world=world,
+        world_options=world_options,
+        engine=engine,
+        parameters=preset_named(preset),
+        planner=planner,
+        unreachable=unreachable,
+        n_stations=cubes,
+        n_remembered=memory_cubes,
+        learning_world=learning_world,
+        learning_policy=learning_policy,
+        learning_actions=learning_actions,
+        n_actions=actions,
+    )
+    if video is not None:
+        _film(plan, seed, video)
+    runs: list[tuple[ServedObject, ...]] = []
+    with options.progress_bar("runs", trials) as advance:
+        for served in run_many(plan, seed, trials, jobs or options.available_cpus(), records, resume):
+            runs.append(served)
+            advance()
+    summary = summarise(runs)
+    parameters = {
+        "world": world,
+        "engine": engine,
+        "preset": preset,
+        "cubes": cubes,
+        "memory_cubes": memory_cubes,
+        "learning_actions": learning_actions,
+        "learning_policy": learning_policy,
+        "learning_world": learning_world,
+        "planner": planner,
+        "unreachable": unreachable,
+        "trials": trials,
+        "actions": actions,
+        "seed": seed,
+        **world_options,
+    }
+    options.write_json({"command": "goal", "parameters": parameters, **summary}, json_file)
+    if json_file != "-":
+        title = f"{trials} runs, {cubes} of {memory_cubes} cubes, {world} world, preset {preset}, engine {engine}"
+        options.console().print(_table(title, summary))
+
+
+def _film(plan: GoalPlan, seed: int, path: Path) -> None:
+    """Film the first run."""
+    pictures: list[Any] = []
+    rates: list[int] = []
+
+    def take(world: World) -> None:
+        picture: Any = world.render()
+        pictures.extend(picture if isinstance(picture, list) else [picture])
+        rates.append(int(world.metadata["render_fps"]))
+
+    filmed = replace(plan, world_options={**plan.world_options, "render_mode": RENDER_MODES[plan.world]})
+    run_goals(filmed, run_seed(seed, 0), on_look=take)
+    figures.save_film(pictures, rates[0], path)
+
+
+def _table(title: str, summary: dict[str, Any]) -> Table:
+    table = Table(title=title, title_justify="left")
+    for heading in ("", "count", "rate", "95% interval"):
+        table.add_column(heading, justify="left" if not heading else "right")
+    rates = {
+        "goals reached": "reached",
+        "goals that the memory had a path to": "reachable",
+        "  of these reached": "reached_of_reachable",
+        "goals without a known path, declared so": "declared_of_unreachable",
+        "runs in which all goals with a path were reached": "runs_with_all_reachable_reached",
+        "reached, as the robot says, but not shown": "wrong_success",
+        "cubes taken for another or for a new one": "wrong_object",
+        "ways to the goal as short as can be": "optimal",
+    }
+    for label, name in rates.items():
+        rate = summary[name]
+        low, high = rate["interval95"]
+        share = "-" if rate["rate"] is None else f"{100 * rate['rate']:.1f}%"
+        table.add_row(label, f"{rate['count']}/{rate['of']}", share, f"{100 * low:.1f}-{100 * high:.1f}%")
+    table.add_section()
+    numbers = {
+        "actions to recognise, mean": "recognition_actions",
+        "actions to a goal reached, mean": "goal_actions",
+        "fewest possible, mean": "optimum",
+        "goals for which the actions ran out": "exhausted",
+        "cubes lost": "lost",
+    }
+    for label, name in numbers.items():
+        value = summary[name]
+        table.add_row(label, "-" if value is None else f"{value:.2f}" if isinstance(value, float) else str(value))
+    return table

@@ -1,0 +1,47 @@
+"""What a policy is, and how one is chosen among actions that are equally good."""
+
+from __future__ import annotations
+
+from typing import ClassVar, Final, NamedTuple, Protocol
+
+import numpy as np
+
+from atg_fg.engines.base import Inference
+from atg_fg.patterns import FloatArray
+
+#: Costs or expected entropies closer than this are a tie.
+TIE_TOLERANCE: Final = 1e-9
+
+
+class Choice(NamedTuple):
+    """What a policy decides after a look.
+
+    Attributes:
+        action: Index of the chosen action; ``None`` ends the trial.
+        expected_entropies: Of each action in nats, shape [A], if the policy looked at them.
+        purpose: What the action is for, or why the trial ends, if the policy has more than one.
+    """
+
+    action: int | None
+    expected_entropies: FloatArray | None
+    purpose: str | None = None
+
+
+class Policy(Protocol):
+    """Chooses an action from the belief after a look; all randomness comes from the trial's generator."""
+
+    name: ClassVar[str]
+
+    def choose(self, inference: Inference, rng: np.random.Generator) -> Choice:
+        """Return the next action."""
+
+
+def best_actions(costs: FloatArray) -> list[int]:
+    """Return all actions whose cost, such as the expected entropy, is the least, up to ``TIE_TOLERANCE``."""
+    return [int(action) for action in np.flatnonzero(costs <= costs.min() + TIE_TOLERANCE)]
+
+
+def one_of_the_best(costs: FloatArray, rng: np.random.Generator) -> int:
+    """Return an action of least cost; ties are broken at random, since a fixed choice would favour one action."""
+    ties = best_actions(costs)
+    return ties[rng.integers(len(ties))]
