@@ -34,7 +34,7 @@ def different_identities(beliefs: Sequence[IdentityBelief]) -> list[IdentityBeli
     """Return p(O_k | evidence of all, all different) of each of n objects.
 
     Args:
-        beliefs: p(O_k | its own evidence) of each object, from the memory's prior.
+        beliefs: p(O_k | its own evidence) of each object, from the memory's prior; what is zero in it is ruled out.
 
     Raises:
         InvalidInputError: A belief is no distribution, or they are about different memories.
@@ -57,7 +57,8 @@ def identity_given_others(prior: IdentityBelief, others: Sequence[IdentityBelief
 
     Args:
         prior: p(O) of the object before this.
-        others: p(O_k | its own evidence) of each other object, from the memory's prior.
+        others: p(O_k | its own evidence) of each other object, from the memory's prior. So not the posterior of a trial
+            that began with what others left: their evidence would count twice.
 
     Raises:
         InvalidInputError, ImpossibleEvidenceError, TooLargeError: As ``different_identities``.

@@ -5,7 +5,8 @@ checked here. A variable with a single state makes GTSAM read memory that is not
 a second, impossible state, which is left out again where values are read.
 
 The highest key becomes the root of a decision tree: O is highest, then X0, X1, … downwards, and the hypothetical
-observation is lowest.
+observation is lowest. Several objects in one graph have numbers from 1: O1, O2, … are highest, then X1,0, X1,1, …,
+X2,0, … downwards. The only object of a graph has the number 0, which its names leave out.
 """
 
 from __future__ import annotations
@@ -25,33 +26,50 @@ FactorGraph: TypeAlias = Any
 Ordering: TypeAlias = Any
 
 MAX_TIME: Final = 1_000_000
-_OBJECT_KEY: Final = 3 * MAX_TIME
-_FIRST_ASPECT_KEY: Final = 2 * MAX_TIME
+MAX_NUMBER: Final = 1_000
+_FIRST_OBJECT_KEY: Final = (MAX_NUMBER + 3) * MAX_TIME
+_FIRST_ASPECT_KEY: Final = (MAX_NUMBER + 2) * MAX_TIME
 HYPOTHETICAL_KEY: Final = 1
 
 
-def object_key() -> int:
-    """Key of the object variable O."""
-    return _OBJECT_KEY
+def object_key(number: int = 0) -> int:
+    """Key of the object variable O, or of O_number of several."""
+    if not 0 <= number <= MAX_NUMBER:
+        raise InvalidInputError(f"object: {number}; expected 0 to {MAX_NUMBER}")
+    return _FIRST_OBJECT_KEY - number
 
 
-def aspect_key(time: int) -> int:
-    """Key of the aspect variable X_time."""
+def aspect_key(time: int, number: int = 0) -> int:
+    """Key of the aspect variable X_time, or of that of O_number of several."""
     if not 0 <= time < MAX_TIME:
         raise InvalidInputError(f"time: {time}; expected 0 to {MAX_TIME - 1}")
-    return _FIRST_ASPECT_KEY - time
+    if not 0 <= number <= MAX_NUMBER:
+        raise InvalidInputError(f"object: {number}; expected 0 to {MAX_NUMBER}")
+    return _FIRST_ASPECT_KEY - number * MAX_TIME - time
 
 
 def key_name(key: int) -> str:
-    """Name of a variable as the paper writes it: O, X0, X1, …, or Z for a hypothetical observation."""
-    if key == _OBJECT_KEY:
-        return "O"
-    return "Z" if key == HYPOTHETICAL_KEY else f"X{_FIRST_ASPECT_KEY - key}"
+    """Name of a variable as the paper writes it: O, X0, X1, …, or Z for a hypothetical observation.
+
+    With several objects it is O1, O2, … and X1,0, X1,1, …, X2,0, …: first the object, then the time.
+    """
+    if key == HYPOTHETICAL_KEY:
+        return "Z"
+    if key > _FIRST_ASPECT_KEY:
+        number = _FIRST_OBJECT_KEY - key
+        return f"O{number}" if number else "O"
+    number, time = divmod(_FIRST_ASPECT_KEY - key, MAX_TIME)
+    return f"X{number},{time}" if number else f"X{time}"
 
 
 def names(keys: Iterable[int]) -> str:
     """Return the names of variables in one text, such as "O, X0"."""
     return ", ".join(key_name(key) for key in keys)
+
+
+def names_in(factor: Factor) -> tuple[str, ...]:
+    """Return the names of a factor's variables, objects first and then by time."""
+    return tuple(key_name(key) for key in sorted(factor.keys(), reverse=True))
 
 
 def factor(keys: Sequence[int], table: FloatArray) -> Factor:

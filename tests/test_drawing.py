@@ -5,7 +5,7 @@ from atg_fg.drawing import recognition_svg
 
 def test_every_variable_is_a_circle_and_every_factor_a_square():
     names = [("O",), ("O", "X0"), ("O", "X0", "X1"), ("O", "X0"), ("O", "X1")]
-    root = ElementTree.fromstring(recognition_svg(1, names))
+    root = ElementTree.fromstring(recognition_svg([("O", "X0", "X1")], names))
     kinds = [element.tag.rpartition("}")[2] for element in root.iter()]
     assert kinds.count("circle") == 3
     assert kinds.count("rect") == 5
