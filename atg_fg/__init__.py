@@ -1,5 +1,6 @@
 """Aspect Transition Graphs as discrete factor graphs: recognise objects by acting on them."""
 
+from atg_fg.all_different import different_identities, identity_given_others
 from atg_fg.arcube import make_arcubes
 from atg_fg.assumptions import Assumptions, arcube_assumptions
 from atg_fg.belief import IdentityBelief
@@ -8,6 +9,7 @@ from atg_fg.engines.base import Inference
 from atg_fg.errors import AtgError
 from atg_fg.experiments import TestPlan, TestResult, run_test, run_tests, summarise
 from atg_fg.graph import AspectTransitionGraph
+from atg_fg.joint_recognition import JointRecognitionGraph
 from atg_fg.memory import RobotMemory
 from atg_fg.parameters import ModelParameters
 from atg_fg.patterns import Evidence, PatternAlphabet
@@ -31,6 +33,7 @@ __all__ = [
     "Evidence",
     "IdentityBelief",
     "Inference",
+    "JointRecognitionGraph",
     "ModelParameters",
     "PatternAlphabet",
     "RecognitionGraph",
@@ -40,6 +43,8 @@ __all__ = [
     "TrialRecord",
     "arcube_assumptions",
     "begin_trial",
+    "different_identities",
+    "identity_given_others",
     "load_memory",
     "make_arcubes",
     "make_policy",
