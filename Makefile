@@ -81,7 +81,8 @@ results-robot: $(READY)  ## Run the experiments on the simulated robot (about an
 		$(BIN)/atg-fg table1 --slip 0.038 --missing 0.032 --preset $$preset --tests 20 --engine bayes-filter \
 			--json results/table1_noisy_$$preset.json || exit; \
 	done
-	$(BIN)/atg-fg sim picture --output docs/images/robonaut.png --film docs/images/robonaut.gif
+	$(BIN)/atg-fg sim picture --output docs/images/robonaut.png --film docs/images/robonaut.gif \
+		--table docs/images/robonaut_table.png
 
 clean:  ## Remove what make has made
 	rm -rf $(VENV) out build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -76,21 +76,26 @@ def calibrate(
 def picture(
     output: Annotated[Path, typer.Option(help="PNG file to write.")] = Path("robot.png"),
     film: Annotated[Path | None, typer.Option(help="Write the robot's three actions as an animated GIF.")] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the cube.")] = 0,
+    table: Annotated[Path | None, typer.Option(help="Write a picture of the robot before three cubes, PNG.")] = None,
+    seed: Annotated[int, typer.Option(help="Seed of the cubes.")] = 0,
     urdf: options.Urdf = None,
 ) -> None:
     """Draw the robot as it turns a cube over: a strip of one flip, and what its head sees.
 
-    Example: atg-fg sim picture --output robot.png --film actions.gif
+    Example: atg-fg sim picture --output robot.png --film actions.gif --table table.png
     """
     options.check_at_least(0, seed=seed)
-    from sim.robot.pictures import draw_actions, draw_flip
+    from sim.robot.pictures import draw_actions, draw_flip, draw_table
 
-    figures.check_figure_path(output)
+    for file in (output, table):
+        if file is not None:
+            figures.check_figure_path(file)
     figures.save_image(draw_flip(seed, urdf), output)
     if film is not None:
         figures.save_film(*draw_actions(seed, urdf), film)
-    typer.echo(f"saved: {output}" + ("" if film is None else f", {film}"))
+    if table is not None:
+        figures.save_image(draw_table(seed, urdf), table)
+    typer.echo(f"saved: {', '.join(str(file) for file in (output, film, table) if file is not None)}")
 
 
 def _run(

@@ -21,6 +21,14 @@ _BORDER: Final = 2  # pixels
 SPEED: Final = 4.0
 
 
+def observer_of(n_stations: int) -> Camera:
+    """Return a camera that has a whole row of stations in view, wherever the robot is, with room for an inset."""
+    if n_stations == 1:
+        return OBSERVER
+    eye = (1.30 + 0.40 * n_stations, 0.15 + 0.10 * n_stations, 0.80 + 0.10 * n_stations)
+    return Camera(eye, (0.15, 0.0, 0.30 + 0.08 * n_stations), 51.0 + 1.4 * n_stations, (480, 360))
+
+
 def observed(scene: Scene, camera: Camera) -> NDArray[np.uint8]:
     """Return what an observer sees, RGB, shape [height, width, 3]."""
     return camera.render(scene.client, _LIGHT, shadow=True)

@@ -20,7 +20,7 @@ from sim.robot.controller import TIME_STEP
 
 TABLE_TOP: Final = float(CUBE_CENTRE[2]) - CUBE_SIZE / 2  # m
 #: From one table's middle to the next one's, m: the arms at work reach into no neighbour's place.
-STATION_SPACING: Final = 0.80
+STATION_SPACING: Final = 0.85
 _RAIL_SPARE: Final = 0.05  # m beyond the last stations
 #: Of a table, m: a wider one would be in the forearms' way.
 TABLE_SIZE: Final = (0.60, 0.60)

@@ -15,6 +15,7 @@ from atg_fg.patterns import IntArray
 from atg_fg.stations import check_one_a_station, drawn_objects
 from sim.camera import Camera
 from sim.cube_body import CUBE_CENTRE, nearest_orientation, rotation_of
+from sim.robot.film import observer_of
 from sim.robot.scene import STATION_SPACING, PlacedCube
 from sim.robot.world import RobonautARcubeWorld
 
@@ -127,7 +128,7 @@ class RobonautTableWorld(RobonautARcubeWorld):
         ]
 
     def _observer(self) -> Camera:
-        return super()._observer().moved(self.scene.robot.place)
+        return observer_of(self.n_stations)
 
     def _truth(self, *, slipped: bool) -> dict[str, Any]:
         return {**super()._truth(slipped=slipped), "station": self.station}

@@ -29,10 +29,10 @@ def test_json_alone_goes_to_standard_output(run):
 
 
 def test_pictures_and_a_film_are_written(run, tmp_path):
-    picture, film = tmp_path / "robot.png", tmp_path / "robot.gif"
-    status, _, error = run("sim", "picture", "--output", picture, "--film", film)
+    picture, film, table = tmp_path / "robot.png", tmp_path / "robot.gif", tmp_path / "table.png"
+    status, _, error = run("sim", "picture", "--output", picture, "--film", film, "--table", table)
     assert (status, error) == (0, "")
-    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert all(file.read_bytes().startswith(b"\x89PNG") for file in (picture, table))
     assert film.read_bytes().startswith(b"GIF89a")
 
 
@@ -44,6 +44,7 @@ def test_bad_options_are_refused(refused, tmp_path):
     assert "nowhere.json" in refused("sim", "calibrate", "nowhere.json")
     assert "cannot be written" in refused("sim", "reliability", "--json", tmp_path / "none" / "file.json")
     assert "suffix" in refused("sim", "picture", "--output", tmp_path / "robot.txt")
+    assert "suffix" in refused("sim", "picture", "--output", tmp_path / "robot.png", "--table", tmp_path / "table.txt")
 
 
 def test_a_table_on_the_robot_is_recorded_and_gone_on_with(run, refused, tmp_path):
