@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-all lint format notebooks bench results results-engines results-robot clean
+.PHONY: help setup demo test test-all lint format notebooks bench results results-engines results-robot results-goal clean
 
 help:  ## Say what there is to make
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -83,6 +83,18 @@ results-robot: $(READY)  ## Run the experiments on the simulated robot (about an
 	done
 	$(BIN)/atg-fg sim picture --output docs/images/robonaut.png --film docs/images/robonaut.gif \
 		--table docs/images/robonaut_table.png
+
+# The goal experiment: in the ideal world with 200 runs each, then on the robot with a record of every run.
+GOAL := goal --engine bayes-filter
+results-goal: $(READY)  ## Reach goal aspects with three cubes (about half an hour on 2 cores)
+	mkdir -p results/goal_robonaut docs/images
+	$(BIN)/atg-fg $(GOAL) --trials 200 --learning-actions 0 --json results/goal_complete.json
+	$(BIN)/atg-fg $(GOAL) --trials 200 --json results/goal_explored.json
+	$(BIN)/atg-fg $(GOAL) --trials 200 --learning-policy random --json results/goal_random.json
+	$(BIN)/atg-fg $(GOAL) --trials 200 --unreachable explore --json results/goal_exploring.json
+	$(BIN)/atg-fg $(GOAL) --trials 200 --planner value-iteration --json results/goal_value_iteration.json
+	$(BIN)/atg-fg $(GOAL) --trials 20 --world robonaut --records results/goal_robonaut --resume \
+		--video docs/images/goal.gif --json results/goal_robonaut.json
 
 clean:  ## Remove what make has made
 	rm -rf $(VENV) out build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -7,7 +7,7 @@ have not been tried and lead to the collection node in the middle.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from atg_fg.errors import InvalidInputError
 from atg_fg.figures import GREY, INK, PALETTE, figure_class, plot_style
-from atg_fg.graph import AspectTransitionGraph
+from atg_fg.graph import AspectTransitionGraph, Edge
 from atg_fg.patterns import FloatArray, Pattern
 
 if TYPE_CHECKING:
@@ -35,7 +35,11 @@ _COLLECTION_BOX: Final = np.array([1.05, 0.34])
 
 
 def draw_atg(
-    graph: AspectTransitionGraph, *, symbol_images: Images | None = None, highlight: int | None = None
+    graph: AspectTransitionGraph,
+    *,
+    symbol_images: Images | None = None,
+    highlight: int | None = None,
+    path: Collection[Edge] = (),
 ) -> Figure:
     """Draw an ATG.
 
@@ -43,13 +47,17 @@ def draw_atg(
         graph: The graph; 1 to about 24 aspects are readable.
         symbol_images: Grey image of each symbol, shape [pixels, pixels]; its number is written where there is none.
         highlight: Index of an aspect to frame, such as the current one.
+        path: Counted transitions to draw strong, such as the way to a goal, while the others are pale.
 
     Raises:
-        InvalidInputError: There is no aspect ``highlight``.
+        InvalidInputError: There is no aspect ``highlight``, or a transition of ``path`` was never counted.
         MissingDependencyError: matplotlib is not installed.
     """
     if highlight is not None and not 0 <= highlight < graph.n_known:
         raise InvalidInputError(f"highlight: aspect {highlight}; expected one of the {graph.n_known} known aspects")
+    for edge in path:
+        if edge not in graph.counts:
+            raise InvalidInputError(f"path: transition {edge}; expected one that {graph.name!r} has counted")
     places, radius = _places(graph.n_known)
     extent = radius + 1.0
     with plot_style():
@@ -59,7 +67,7 @@ def draw_atg(
         axes.set(xlim=(-extent, extent), ylim=(-extent, extent), aspect="equal")
         axes.axis("off")
         _draw_unknown(axes, graph, places)
-        _draw_observed(axes, graph, places)
+        _draw_observed(axes, graph, places, path)
         _draw_collection(axes, graph)
         for aspect, pattern in enumerate(graph.aspects):
             _draw_aspect(axes, graph, pattern, places[aspect], symbol_images or {}, framed=aspect == highlight)
@@ -108,19 +116,20 @@ def _draw_unknown(axes: Axes, graph: AspectTransitionGraph, places: FloatArray) 
         _arrow(axes, places[aspect], border, 0.13 * (action - middle), 0.05, **style)
 
 
-def _draw_observed(axes: Axes, graph: AspectTransitionGraph, places: FloatArray) -> None:
+def _draw_observed(axes: Axes, graph: AspectTransitionGraph, places: FloatArray, path: Collection[Edge]) -> None:
     """Draw a solid arrow for each counted transition, the more bent the more there are between two aspects."""
     between: Counter[tuple[int, int]] = Counter()
     for (source, action, target), count in sorted(graph.counts.items()):
         number = between[source, target]
         between[source, target] += 1
+        strength = _strength((source, action, target), path)
         if source == target:
-            label = _draw_loop(axes, places[source], number, _color(action))
+            label = _draw_loop(axes, places[source], number, color=_color(action), **strength)
         else:
             # A straight way through the middle would be hidden by the collection node.
             through_middle = np.linalg.norm(places[source] + places[target]) < 1.0
             bend = 0.16 + 0.13 * number + 0.4 * bool(through_middle and graph.n_unobserved)
-            _arrow(axes, places[source], places[target], bend, 0.66, color=_color(action), linewidth=1.6)
+            _arrow(axes, places[source], places[target], bend, 0.66, color=_color(action), **strength)
             span = places[target] - places[source]
             label = (places[source] + places[target]) / 2 + bend / 2 * np.array([span[1], -span[0]])
         if count > 1:
@@ -130,7 +139,13 @@ def _draw_observed(axes: Axes, graph: AspectTransitionGraph, places: FloatArray)
             )  # fmt: skip
 
 
-def _draw_loop(axes: Axes, place: FloatArray, number: int, color: str) -> FloatArray:
+def _strength(edge: Edge, path: Collection[Edge]) -> dict[str, float]:
+    if not path:
+        return {"linewidth": 1.6}
+    return {"linewidth": 4.0} if edge in path else {"linewidth": 1.2, "alpha": 0.4}
+
+
+def _draw_loop(axes: Axes, place: FloatArray, number: int, **style: Any) -> FloatArray:
     """Draw an arrow from an aspect to itself, on its outer side; return where its label goes."""
     outward = place / np.linalg.norm(place)
     sideways = np.array([-outward[1], outward[0]])
@@ -139,7 +154,7 @@ def _draw_loop(axes: Axes, place: FloatArray, number: int, color: str) -> FloatA
     start, end = foot + 0.22 * sideways, foot - 0.22 * sideways
     axes.annotate(
         "", tuple(end), tuple(start), zorder=1,
-        arrowprops={"arrowstyle": "-|>", "color": color, "linewidth": 1.6,
+        arrowprops={"arrowstyle": "-|>", **style,
                     "connectionstyle": f"arc3,rad={-4 * reach}", "shrinkA": 0, "shrinkB": 0},
     )  # fmt: skip
     return np.asarray(foot + 2 * reach * 0.44 * outward)

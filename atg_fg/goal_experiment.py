@@ -25,7 +25,7 @@ from atg_fg.goals import Goal
 from atg_fg.memory_learning import complete_memory, learned_memory
 from atg_fg.parameters import ModelParameters
 from atg_fg.policies import POLICIES, GoalPolicy, make_policy
-from atg_fg.policies.goal import PLANNERS, UNREACHABLE
+from atg_fg.policies.goal import PLANNERS, SETTLED, UNREACHABLE
 from atg_fg.stations import AtStation, make_stations
 from atg_fg.store import make_folder
 from atg_fg.trial import TrialRecord, run_trial
@@ -46,6 +46,7 @@ class GoalPlan:
         parameters: α, δ and whether to learn within the trial.
         planner: Name of the planner.
         unreachable: What to do about a goal that no known path leads to.
+        settled: Entropy of O below which an object is recognised, nats.
         n_stations: Objects before the robot, all different.
         n_remembered: Cubes that the memory is learned from.
         n_objects: |O|.
@@ -61,6 +62,7 @@ class GoalPlan:
     parameters: ModelParameters = field(default_factory=ModelParameters)
     planner: str = "attempts"
     unreachable: str = "declare"
+    settled: float = SETTLED
     n_stations: int = 3
     n_remembered: int = 20
     n_objects: int = 100
@@ -128,7 +130,7 @@ def run_goals(
         world.reset(seed=int(setup.integers(2**31)), options={"objects": objects})
         for station, (number, station_seed) in enumerate(zip(objects, station_seeds, strict=True)):
             wanted = shown_pattern(cubes[number], int(setup.integers(len(ORIENTATIONS))))
-            goal_policy = GoalPolicy(Goal(assumptions.alphabet, wanted), plan.planner, plan.unreachable)
+            goal_policy = GoalPolicy(Goal(assumptions.alphabet, wanted), plan.planner, plan.unreachable, plan.settled)
             # The objects are different ones: what is known of those served says what this one is not.
             prior = identity_given_others(memory_prior, beliefs)
             inference = begin_trial(plan.engine, memory, plan.parameters, prior=prior)

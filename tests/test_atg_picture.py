@@ -89,3 +89,18 @@ def test_the_same_graph_gives_the_same_picture():
 def test_an_aspect_that_is_not_there_cannot_be_highlighted(highlight):
     with pytest.raises(InvalidInputError, match=f"highlight: aspect {highlight}"):
         draw_atg(explored(4), highlight=highlight)
+
+
+def test_a_path_is_drawn_strong_and_the_other_transitions_pale():
+    from matplotlib.patches import FancyArrowPatch
+
+    graph = explored(6)
+    edges = [edge for edge in graph.counts if edge[0] != edge[2]]
+    patches = [patch for patch in draw_atg(graph, path=edges[:2]).axes[0].patches if isinstance(patch, FancyArrowPatch)]
+    solid = [patch for patch in patches if patch.get_linestyle() in ("-", "solid")]
+    assert sorted(patch.get_alpha() or 1.0 for patch in solid) == [0.4] * (len(edges) - 2) + [1.0] * 2
+
+
+def test_a_path_that_was_never_seen_is_refused():
+    with pytest.raises(InvalidInputError, match=r"path: transition \(0, 0, 9\)"):
+        draw_atg(explored(6), path=[(0, 0, 9)])

@@ -15,7 +15,7 @@ from atg_fg.errors import InvalidInputError, unknown_name
 from atg_fg.goal_experiment import COMPLETE, GoalPlan, run_goals, run_many, run_seed
 from atg_fg.goal_scoring import ServedObject, summarise
 from atg_fg.policies import POLICIES
-from atg_fg.policies.goal import PLANNERS
+from atg_fg.policies.goal import PLANNERS, SETTLED
 from atg_fg.presets import preset as preset_named
 from atg_fg.worlds import World
 
@@ -38,6 +38,9 @@ def goal(
     unreachable: Annotated[
         str, typer.Option(help="A goal that no known path leads to: declare (say so and stop) or explore.")
     ] = "declare",
+    settled: Annotated[
+        float, typer.Option(help="Entropy of identity below which a cube is recognised, nats.")
+    ] = SETTLED,
     trials: Annotated[int, typer.Option(help="Runs, each with a memory, cubes and goals of its own.")] = 20,
     actions: Annotated[int, typer.Option(help="Actions on each cube, at most.")] = 40,
     seed: Annotated[int, typer.Option(help="Seed of all runs.")] = 0,
@@ -75,6 +78,7 @@ def goal(
         parameters=preset_named(preset),
         planner=planner,
         unreachable=unreachable,
+        settled=settled,
         n_stations=cubes,
         n_remembered=memory_cubes,
         learning_world=learning_world,
@@ -101,6 +105,7 @@ def goal(
         "learning_world": learning_world,
         "planner": planner,
         "unreachable": unreachable,
+        "settled": settled,
         "trials": trials,
         "actions": actions,
         "seed": seed,

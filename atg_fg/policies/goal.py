@@ -21,6 +21,9 @@ from atg_fg.value_iteration import action_values
 #: What may be done about a goal that no known path leads to.
 UNREACHABLE: Final = ("declare", "explore")
 
+#: Entropy of O below which an object is recognised, nats: then, if the belief is right, about one in 750 is another.
+SETTLED: Final = 0.01
+
 #: Costs of reaching a goal by each first action, shape [A, H, W]: ∞ where none is known, nan where nobody looked.
 Planner: TypeAlias = Callable[[Inference, Goal], FloatArray]
 
@@ -84,7 +87,7 @@ class GoalPolicy:
         goal: Goal,
         planner: str = "attempts",
         unreachable: str = "declare",
-        settled: float = 0.05,
+        settled: float = SETTLED,
         confidence: float = 0.95,
     ) -> None:
         if planner not in PLANNERS:
