@@ -50,9 +50,8 @@ class RobotBody:
         self.client = client
         with tempfile.TemporaryDirectory(prefix="robonaut-") as folder:
             description = read_description(urdf if urdf is not None else write_robot(Path(folder)))
-            if rail_reach is not None:
-                description = on_rail(description, Path(folder), rail_reach)
-            self.body = self._load(description)
+            path = description.path if rail_reach is None else on_rail(description, Path(folder), rail_reach)
+            self.body = self._load(description, path)
         self.rail = None if rail_reach is None else Rail(client, self.body)
         self.kinematics = description.kinematics()
         upright = np.array_equal(description.base_rotation, np.eye(3))
@@ -170,12 +169,13 @@ class RobotBody:
         """Whether an arm touches the torso, the head or the other arm."""
         return bool(pybullet.getContactPoints(self.body, self.body, physicsClientId=self.client))
 
-    def _load(self, description: Description) -> int:
+    def _load(self, description: Description, path: Path) -> int:
+        """Load a description from ``path``, its own or that of a copy on a rail."""
         flags = pybullet.URDF_USE_INERTIA_FROM_FILE | pybullet.URDF_USE_SELF_COLLISION
         try:
             return int(
                 pybullet.loadURDF(
-                    str(description.path),
+                    str(path),
                     description.base_position.tolist(),
                     quaternion_of(description.base_rotation),
                     useFixedBase=True,

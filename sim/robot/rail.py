@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Final
 from xml.etree import ElementTree
@@ -23,8 +22,8 @@ _POSITION_GAIN, _VELOCITY_GAIN = 0.1, 1.0
 _NAME: Final = "atg-fg rail"
 
 
-def on_rail(description: Description, folder: Path, reach: float) -> Description:
-    """Return a description whose root slides on a rail, ``reach`` (m) to the robot's left and right.
+def on_rail(description: Description, folder: Path, reach: float) -> Path:
+    """Write a copy whose root slides on a rail, ``reach`` (m) to the robot's left and right, and return its path.
 
     It is written into ``folder``, an absolute path; meshes and textures stay where they are.
     """
@@ -47,7 +46,7 @@ def on_rail(description: Description, folder: Path, reach: float) -> Description
     ElementTree.SubElement(joint, "limit", {name: f"{value:g}" for name, value in limits.items()})
     path = folder / "on_rail.urdf"
     path.write_bytes(ElementTree.tostring(robot))
-    return replace(description, path=path)
+    return path
 
 
 def _found(filename: str, urdf: Path) -> str:
@@ -113,9 +112,11 @@ class Rail:
         """Drive the base to ``end`` (m) along a cubic curve from rest to rest, one step of the simulation at a time."""
         begin = self.position
         way = end - begin
-        seconds = max(1.5 * abs(way) / _PLANNED_SPEED, np.sqrt(6 * abs(way) / _PLANNED_ACCELERATION))
         time_step = pybullet.getPhysicsEngineParameters(physicsClientId=self._client)["fixedTimeStep"]
-        steps = max(1, round(seconds / time_step))
+        # A cubic from rest to rest is quickest half way, and speeds up most at its ends.
+        least = max(1.5 * abs(way) / _PLANNED_SPEED, np.sqrt(6 * abs(way) / _PLANNED_ACCELERATION))
+        steps = max(1, round(least / time_step))
+        seconds = steps * time_step
         for part in np.arange(1, steps + 1) / steps:
             self.drive(begin + way * part**2 * (3 - 2 * part), 6 * way * part * (1 - part) / seconds)
             yield

@@ -109,10 +109,14 @@ class RobonautTableWorld(RobonautARcubeWorld):
         if orientations is None:
             orientations = self.np_random.integers(len(ORIENTATIONS), size=self.n_stations)
         check_one_a_station("orientations", orientations, self.n_stations)
-        self._presented = []
-        for object_, orientation in zip(objects, orientations, strict=True):
-            super()._present({"object": object_, "orientation": orientation})
-            self._presented.append(Presented(self.object, self.orientation))
+        # Nothing is presented before all is found to be in order.
+        self._presented = [
+            Presented(
+                self._chosen({"object": cube}, "object", len(self.cubes)),
+                self._chosen({"orientation": orientation}, "orientation", len(ORIENTATIONS)),
+            )
+            for cube, orientation in zip(objects, orientations, strict=True)
+        ]
         self.station, self.object, self.orientation = 0, self._presented[0].object, self._presented[0].orientation
 
     def _placed_cubes(self) -> list[PlacedCube]:
