@@ -26,6 +26,7 @@ Actions = Annotated[int, typer.Option(help="Number of random actions.")]
 def reliability(
     condition: Condition = "nominal",
     actions: Actions = 1000,
+    stations: Annotated[int, typer.Option(help="Cubes in the scene; the robot goes to a random one each time.")] = 1,
     seed: Annotated[int, typer.Option(help="Seed of cubes, actions and circumstances.")] = 0,
     urdf: options.Urdf = None,
     jobs: options.Jobs = None,
@@ -37,9 +38,11 @@ def reliability(
     """
     from sim.robot.reliability import summarise
 
-    runs = _run(condition, actions, seed, urdf, jobs, json_file)
+    runs = _run(condition, actions, stations, seed, urdf, jobs, json_file)
     summary = summarise(runs)
     parameters = {"condition": condition, "actions": actions, "seed": seed}
+    if stations > 1:
+        parameters["stations"] = stations
     options.write_json({"command": "sim reliability", "parameters": parameters, **summary}, json_file)
     if json_file != "-":
         options.console().print(_reliability_table(f"{condition}: {actions} random actions, seed {seed}", summary))
@@ -99,16 +102,16 @@ def picture(
 
 
 def _run(
-    condition: str, actions: int, seed: int, urdf: Path | None, jobs: int | None, json_file: str | None
+    condition: str, actions: int, stations: int, seed: int, urdf: Path | None, jobs: int | None, json_file: str | None
 ) -> list[Any]:
     """Check the options and run the actions, with a progress bar."""
     from sim.robot.reliability import ACTIONS_A_TRIAL, run_actions
 
-    options.check_at_least(1, actions=actions, jobs=jobs)
+    options.check_at_least(1, actions=actions, stations=stations, jobs=jobs)
     options.check_at_least(0, seed=seed)
     options.check_json_option(json_file)
     with options.progress_bar("trials", -(-actions // ACTIONS_A_TRIAL)) as advance:
-        return run_actions(condition, actions, seed, jobs or options.available_cpus(), urdf, advance)
+        return run_actions(condition, actions, seed, jobs or options.available_cpus(), urdf, advance, stations)
 
 
 def _reliability_table(title: str, summary: dict[str, Any]) -> Table:

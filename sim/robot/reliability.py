@@ -20,6 +20,7 @@ from atg_fg.patterns import FloatArray
 from atg_fg.statistics import wilson_interval
 from atg_fg.worlds import MISSING
 from sim.robot.conditions import condition_named
+from sim.robot.table_world import RobonautTableWorld
 from sim.robot.world import RobonautARcubeWorld
 
 #: Actions between two new cubes, as in a trial.
@@ -86,8 +87,11 @@ def run_actions(
     jobs: int = 1,
     urdf: Path | None = None,
     on_trial: Callable[[], None] | None = None,
+    n_stations: int = 1,
 ) -> list[Run]:
     """Let the robot do random actions, a new cube every ten, and return what came of them.
+
+    Where there are several cubes, the robot goes to a random one before each action.
 
     Each trial has its own generator, spawned from ``SeedSequence(seed)``; the result is the same for any ``jobs``.
 
@@ -98,9 +102,10 @@ def run_actions(
         jobs: Processes.
         urdf: A user's own description of the robot.
         on_trial: Called after each trial.
+        n_stations: Cubes in the scene.
     """
     condition_named(condition)
-    for name, number in (("actions", n_actions), ("jobs", jobs)):
+    for name, number in (("actions", n_actions), ("jobs", jobs), ("stations", n_stations)):
         if number < 1:
             raise InvalidInputError(f"{name}: {number}; expected a whole number of at least 1")
     runs: list[Run] = []
@@ -110,7 +115,7 @@ def run_actions(
         while left > 0:
             lengths = [ACTIONS_A_TRIAL] * (left // ACTIONS_A_TRIAL)
             lengths += [left % ACTIONS_A_TRIAL] if left % ACTIONS_A_TRIAL else []
-            for run in run_all(partial(_run_trial, condition, urdf), lengths, spawner.spawn(len(lengths))):
+            for run in run_all(partial(_run_trial, condition, urdf, n_stations), lengths, spawner.spawn(len(lengths))):
                 runs.append(run)
                 left -= len(run.actions)
                 if on_trial is not None:
@@ -128,17 +133,22 @@ def _mapping(jobs: int) -> Iterator[Callable[..., Iterator[Run]]]:
         yield pool.map
 
 
-def _run_trial(condition: str, urdf: Path | None, n_actions: int, seed: np.random.SeedSequence) -> Run:
+def _run_trial(condition: str, urdf: Path | None, n_stations: int, n_actions: int, seed: np.random.SeedSequence) -> Run:
     rng = np.random.default_rng(seed)
-    with closing(RobonautARcubeWorld(condition=condition, urdf=urdf)) as world:
+    with closing(_world(condition, urdf, n_stations)) as world:
         begun = time.perf_counter()
         observation, info = world.reset(seed=int(rng.integers(2**31)))
         run = Run(world.controller.exertion.velocity, world.controller.exertion.effort)
         run.looks.append(Look(tuple(observation.tolist()), info["pattern"]))
         for action in rng.integers(len(_ACTIONS), size=n_actions):
-            observation, _, lost, _, info = world.step(action)
+            if n_stations > 1:
+                observation, _, _, _, info = world.step(len(_ACTIONS) + rng.integers(n_stations))
+                if info["lost"]:
+                    break
+                run.looks.append(Look(tuple(observation.tolist()), info["pattern"]))
+            observation, _, _, _, info = world.step(action)
             run.actions.append(ScoredAction(_ACTIONS[action], info))
-            if lost:
+            if info["lost"]:
                 break
             run.looks.append(Look(tuple(observation.tolist()), info["pattern"]))
         run.wall_seconds = time.perf_counter() - begun
@@ -146,6 +156,12 @@ def _run_trial(condition: str, urdf: Path | None, n_actions: int, seed: np.rando
         run.velocity, run.effort, run.saturated_steps = exertion.velocity, exertion.effort, exertion.saturated_steps
         run.self_contacts, run.steps = world.scene.self_contacts, world.scene.steps
     return run
+
+
+def _world(condition: str, urdf: Path | None, n_stations: int) -> RobonautARcubeWorld:
+    if n_stations == 1:
+        return RobonautARcubeWorld(condition=condition, urdf=urdf)
+    return RobonautTableWorld(n_stations=n_stations, condition=condition, urdf=urdf)
 
 
 def summarise(runs: Sequence[Run]) -> dict[str, Any]:

@@ -40,6 +40,8 @@ def test_bad_options_are_refused(refused, tmp_path):
     assert "condition: unknown name 'new'" in refused("sim", "reliability", "--condition", "new")
     assert "--actions: 0" in refused("sim", "reliability", "--actions", 0)
     assert "--jobs: 0" in refused("sim", "reliability", "--jobs", 0)
+    assert "--stations: 0" in refused("sim", "reliability", "--stations", 0)
+    assert "n_stations: 6" in refused("sim", "reliability", "--stations", 6, "--actions", 1, "--jobs", 1)
     assert "nowhere.urdf" in refused("sim", "reliability", "--urdf", "nowhere.urdf", "--actions", 1, "--jobs", 1)
     assert "nowhere.json" in refused("sim", "calibrate", "nowhere.json")
     assert "cannot be written" in refused("sim", "reliability", "--json", tmp_path / "none" / "file.json")

@@ -134,3 +134,10 @@ def test_a_hundred_nominal_actions_are_right():
     assert summary["detection"]["both"]["rate"] >= 0.97
     assert summary["joints"]["self_contacts"] == 0
     assert summary["joints"]["largest_share_of_effort_limit"] <= 1
+
+
+def test_where_there_are_several_cubes_each_is_looked_at_before_the_action():
+    (run,) = run_actions("nominal", 2, seed=1, n_stations=2)
+    assert len(run.looks) == 5
+    assert {action.info["station"] for action in run.actions} <= {0, 1}
+    assert summarise([run])["success"]["rate"] == 1
