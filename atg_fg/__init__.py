@@ -8,12 +8,13 @@ from atg_fg.engines import ENGINES, begin_trial
 from atg_fg.engines.base import Inference
 from atg_fg.errors import AtgError
 from atg_fg.experiments import TestPlan, TestResult, run_test, run_tests, summarise
+from atg_fg.goals import Goal
 from atg_fg.graph import AspectTransitionGraph
 from atg_fg.joint_recognition import JointRecognitionGraph
 from atg_fg.memory import RobotMemory
 from atg_fg.parameters import ModelParameters
 from atg_fg.patterns import Evidence, PatternAlphabet
-from atg_fg.policies import POLICIES, make_policy
+from atg_fg.policies import POLICIES, GoalPolicy, make_policy
 from atg_fg.presets import PRESETS, preset
 from atg_fg.recognition import RecognitionGraph
 from atg_fg.store import load_memory, save_memory
@@ -31,6 +32,8 @@ __all__ = [
     "Assumptions",
     "AtgError",
     "Evidence",
+    "Goal",
+    "GoalPolicy",
     "IdentityBelief",
     "Inference",
     "JointRecognitionGraph",
