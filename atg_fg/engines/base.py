@@ -10,11 +10,11 @@ import numpy as np
 from atg_fg.belief import IdentityBelief, log_of
 from atg_fg.chain import Chain, History, build_chain
 from atg_fg.errors import ImpossibleEvidenceError, InvalidInputError
-from atg_fg.goal_planning import TransitionGraph, transitions_of_hypothesis
 from atg_fg.memory import RobotMemory
 from atg_fg.model import RecognitionModel, Revelation
 from atg_fg.parameters import ModelParameters
 from atg_fg.patterns import Evidence, FloatArray
+from atg_fg.situations import Situation, shown_patterns_of, situations_of
 
 
 class Inference(ABC):
@@ -78,9 +78,19 @@ class Inference(ABC):
             raise InvalidInputError("expected entropy: asked before the look; expected an observation first")
         return self._expected_entropies()
 
-    def transition_graph(self, hypothesis: int) -> TransitionGraph:
-        """Return the known transitions of a hypothesis, for planning; its nodes are the model's states."""
-        return transitions_of_hypothesis(self.model, hypothesis)
+    def situations(self) -> list[Situation]:
+        """Return what the object may be, and where in it the robot may be; improbable ones are left out."""
+        return situations_of(self.model, self.aspect_belief)
+
+    def shown_patterns(self) -> FloatArray:
+        """Return the probability of each pattern to be the one shown now, given all evidence, shape [|𝒵|].
+
+        Raises:
+            InvalidInputError: Asked before a look or between an action and its look.
+        """
+        if self.history.awaits_evidence:
+            raise InvalidInputError("shown patterns: asked before the look; expected an observation first")
+        return shown_patterns_of(self.model, self.aspect_belief, self.history.evidence[-1])
 
     def chain(self, hypothesis: int | None = None) -> Chain:
         """Return the trial so far as plain arrays, for all hypotheses or under one of them."""

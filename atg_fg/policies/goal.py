@@ -11,11 +11,11 @@ from atg_fg.engines.base import Inference
 from atg_fg.errors import InvalidInputError, unknown_name
 from atg_fg.goal_planning import COSTS, action_costs, goal_aspects
 from atg_fg.goals import Goal
-from atg_fg.model import COLLECTION
-from atg_fg.patterns import FloatArray
 from atg_fg.policies.base import Choice, Policy
-from atg_fg.policies.exploration import best_by_expectation, costs_of_exploring, costs_per_state
+from atg_fg.policies.exploration import outlooks_on_the_new
+from atg_fg.policies.outlook import Outlook, best_by_expectation, share_with_a_path
 from atg_fg.policies.recognition import EntropyPolicy
+from atg_fg.situations import LEAST_PROBABILITY
 from atg_fg.value_iteration import action_values
 
 #: What may be done about a goal that no known path leads to.
@@ -24,8 +24,8 @@ UNREACHABLE: Final = ("declare", "explore")
 #: Entropy of O below which an object is recognised, nats: then, if the belief is right, about one in 750 is another.
 SETTLED: Final = 0.01
 
-#: Costs of reaching a goal by each first action, shape [A, H, W]: ∞ where none is known, nan where nobody looked.
-Planner: TypeAlias = Callable[[Inference, Goal], FloatArray]
+#: Returns the costs of reaching a goal by each first action, in each situation.
+Planner: TypeAlias = Callable[[Inference, Goal], list[Outlook]]
 
 
 class ShortestPaths:
@@ -40,17 +40,29 @@ class ShortestPaths:
             raise unknown_name("cost of a path", cost, COSTS)
         self.cost = cost
 
-    def __call__(self, inference: Inference, goal: Goal) -> FloatArray:
-        """Return the cost of each first action, shape [A, H, W]."""
+    def __call__(self, inference: Inference, goal: Goal) -> list[Outlook]:
+        """Return the outlook of each situation."""
         n_actions = inference.model.n_actions
-        return costs_per_state(
-            inference, lambda graph: action_costs(graph, goal_aspects(graph, goal), n_actions, self.cost)
+        return [
+            Outlook.on(
+                situation, action_costs(situation.graph, goal_aspects(situation.graph, goal), n_actions, self.cost)
+            )
+            for situation in inference.situations()
+        ]
+
+
+def value_iteration(inference: Inference, goal: Goal) -> list[Outlook]:
+    """Return QMDP's values as outlooks; none is infinite, since it counts on the unknown. It knows plain ATGs only."""
+    values, belief = action_values(inference.model, goal), inference.aspect_belief
+    probabilities = belief.sum(axis=1)
+    return [
+        Outlook(
+            float(probabilities[hypothesis]),
+            dict(enumerate((belief[hypothesis] / probabilities[hypothesis]).tolist())),
+            dict(enumerate(values[:, hypothesis].T)),
         )
-
-
-def value_iteration(inference: Inference, goal: Goal) -> FloatArray:
-    """Return QMDP's values of each first action, shape [A, H, W]; never infinite, since it counts on the unknown."""
-    return action_values(inference.model, goal)
+        for hypothesis in np.flatnonzero(probabilities >= LEAST_PROBABILITY)
+    ]
 
 
 #: Planners by name.
@@ -107,39 +119,18 @@ class GoalPolicy:
 
     def choose(self, inference: Inference, rng: np.random.Generator) -> Choice:
         """Return the next action, or none with purpose ``reached`` or ``unreachable``."""
-        belief = inference.aspect_belief
         if self.is_reached(inference):
             return Choice(None, None, "reached")
         if inference.identity().entropy_of_verdict > self.settled:
             return self._recognition.choose(inference, rng)._replace(purpose="recognise")
-        costs = self._planner(inference, self.goal)
-        if _share_with_a_path(belief, costs) > 0.5:
-            return Choice(best_by_expectation(belief, costs, rng), None, "approach")
+        n_actions = inference.model.n_actions
+        outlooks = self._planner(inference, self.goal)
+        if share_with_a_path(outlooks) > 0.5:
+            return Choice(best_by_expectation(outlooks, n_actions, rng), None, "approach")
         if self.unreachable == "declare":
             return Choice(None, None, "unreachable")
-        return Choice(best_by_expectation(belief, costs_of_exploring(inference), rng), None, "explore")
+        return Choice(best_by_expectation(outlooks_on_the_new(inference), n_actions, rng), None, "explore")
 
     def is_reached(self, inference: Inference) -> bool:
         """Whether the goal is shown now, with the confidence asked for."""
-        return probability_shown(inference, self.goal) >= self.confidence
-
-
-def probability_shown(inference: Inference, goal: Goal) -> float:
-    """Return the probability that an inference, after a look, gives to the goal's being shown now."""
-    model, belief = inference.model, inference.aspect_belief
-    known = belief[(model.pattern_of >= 0) & goal.patterns[model.pattern_of]].sum()
-    # In a collection node the pattern is one that the object was not known to show, as far as the evidence agrees.
-    seen = inference.history.evidence[-1].likelihood
-    agrees = (1 - model.parameters.observation_noise) * seen
-    agrees = agrees + model.parameters.observation_noise * seen.mean()
-    unknown = model.unknown @ agrees
-    share = np.divide(model.unknown @ (agrees * goal.patterns), unknown, out=np.zeros_like(unknown), where=unknown > 0)
-    return float(known + belief[:, COLLECTION] @ share)
-
-
-def _share_with_a_path(belief: FloatArray, costs: FloatArray) -> float:
-    """Return the share of the belief, where anybody looked, from which some action leads on to the goal."""
-    looked = ~np.isnan(costs).any(axis=0)
-    leads_on = looked & np.isfinite(costs).any(axis=0)
-    total = float(belief[looked].sum())
-    return float(belief[leads_on].sum()) / total if total > 0 else 0.0
+        return float(inference.shown_patterns()[self.goal.patterns].sum()) >= self.confidence

@@ -14,7 +14,7 @@ from atg_fg.memory import RobotMemory
 from atg_fg.memory_learning import complete_memory
 from atg_fg.parameters import ModelParameters
 from atg_fg.patterns import Evidence
-from atg_fg.policies.goal import PLANNERS, GoalPolicy, probability_shown
+from atg_fg.policies.goal import PLANNERS, GoalPolicy
 from atg_fg.presets import preset
 from atg_fg.trial import run_trial
 from atg_fg.worlds import ARcubeWorld
@@ -155,21 +155,8 @@ def test_a_look_that_may_be_wrong_is_not_trusted_to_show_the_goal():
     """One look in ten shows anything; a single one of an unknown object is more probably right than the goal sure."""
     inference = begin_trial("bayes-filter", MEMORY, ModelParameters(1e-8, 0.1))
     inference.observe(Evidence.of_detection(ASSUMPTIONS.alphabet, goal_of(2, 9).symbols))
-    probability = probability_shown(inference, goal_of(2, 9))
-    assert 0.5 < probability < 0.95
+    assert 0.5 < inference.shown_patterns()[goal_of(2, 9).patterns].sum() < 0.95
     assert not GoalPolicy(goal_of(2, 9)).is_reached(inference)
-
-
-@pytest.mark.parametrize("learn", [True, False])
-def test_the_probability_shown_is_that_of_the_model_by_enumeration_of_patterns(learn):
-    """Over all patterns it sums to one, and a complete look without noise is sure."""
-    inference = begin_trial("bayes-filter", one_way_memory(), ModelParameters(0.1, 0.2, learn))
-    inference.observe(Evidence.of_detection(ASSUMPTIONS.alphabet, (3, None)))
-    shown = [probability_shown(inference, Goal(ASSUMPTIONS.alphabet, each)) for each in ASSUMPTIONS.alphabet.patterns]
-    assert sum(shown) == pytest.approx(1.0, abs=1e-9)
-    sure = begin_trial("bayes-filter", one_way_memory(), ModelParameters(0.1, 0.0, learn))
-    sure.observe(Evidence.of_detection(ASSUMPTIONS.alphabet, (3, 4)))
-    assert probability_shown(sure, Goal(ASSUMPTIONS.alphabet, (3, 4))) == pytest.approx(1.0, abs=1e-12)
 
 
 def test_bad_options_are_refused():
