@@ -52,7 +52,7 @@ def on_rail(description: Description, folder: Path, reach: float) -> Path:
 def _found(filename: str, urdf: Path) -> str:
     """Return the absolute path of a file that a description names, looked for as PyBullet does: ever further up."""
     relative = filename.removeprefix("package://").removeprefix("model://")
-    for folder in urdf.resolve().parents:
+    for folder in urdf.absolute().parents:
         if (folder / relative).exists():
             return str(folder / relative)
     return filename
