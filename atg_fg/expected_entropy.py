@@ -77,6 +77,49 @@ def edge_arrivals(model: RecognitionModel, mass: FloatArray) -> FloatArray:
     return arrivals.astype(np.float64).reshape(shape)
 
 
+def next_pattern_joint(model: RecognitionModel, mass: FloatArray) -> NextPatternJoint:
+    """Return p(O = i, z | a) of each action.
+
+    Args:
+        model: The tables in force.
+        mass: p(O, X_t | z_0:t), or an approximation of it, shape [H, W].
+    """
+    observed = 1.0 - model.parameters.observation_noise
+    noise = model.parameters.observation_noise / model.n_patterns * mass.sum(axis=1)
+    kept = np.einsum("hx,ahx->ah", mass, model.stay)
+    unreached = kept * (observed / model.n_aspects) + noise
+    arrivals = edge_arrivals(model, mass)
+    reached = np.flatnonzero(arrivals)
+    targets = Targets(*np.unravel_index(reached, arrivals.shape))
+    return NextPatternJoint(
+        unknown=kept * model.base[:, COLLECTION] * model.unknown_rate + noise,
+        unreached=unreached,
+        targets=targets,
+        reached=unreached[targets.action, targets.hypothesis] + observed * arrivals.ravel()[reached],
+    )
+
+
+def pattern_table(model: RecognitionModel, joint: NextPatternJoint) -> FloatArray:
+    """Return J = p(O = i, z | a) of every pattern, shape [A, H, |𝒵|]."""
+    table: FloatArray = joint.unknown[:, :, None] * model.unknown + joint.unreached[:, :, None] * model.known
+    action, hypothesis, state = joint.targets
+    table[action, hypothesis, model.pattern_of[hypothesis, state]] = joint.reached
+    return table
+
+
+def expected_entropies_of_table(table: FloatArray, unseen: float, n_unseen: int) -> FloatArray:
+    """Return eq. 3 for each action in nats, shape [A], from J = p(O = i, z | a) of every pattern, shape [A, H, |𝒵|].
+
+    Args:
+        table: J; its last hypothesis is *unseen*.
+        unseen: p(unseen | z_0:t).
+        n_unseen: U.
+    """
+    terms = x_log_x(table.sum(axis=1)).sum(axis=1) - x_log_x(table).sum(axis=(1, 2))
+    entropies: FloatArray = terms + unseen * np.log(n_unseen)
+    return np.maximum(entropies, 0.0)
+
+
 def expected_entropies_of(model: RecognitionModel, mass: FloatArray) -> FloatArray:
     """Return eq. 3 for each action in nats, shape [A], from a belief over object and present aspect.
 
@@ -84,18 +127,4 @@ def expected_entropies_of(model: RecognitionModel, mass: FloatArray) -> FloatArr
         model: The tables in force.
         mass: p(O, X_t | z_0:t), or an approximation of it that sums to one, shape [H, W].
     """
-    observed = 1.0 - model.parameters.observation_noise
-    total = mass.sum(axis=1)
-    noise = model.parameters.observation_noise / model.n_patterns * total
-    kept = np.einsum("hx,ahx->ah", mass, model.stay)
-    unreached = kept * (observed / model.n_aspects) + noise
-    arrivals = edge_arrivals(model, mass)
-    reached = np.flatnonzero(arrivals)
-    targets = Targets(*np.unravel_index(reached, arrivals.shape))
-    joint = NextPatternJoint(
-        unknown=kept * model.base[:, COLLECTION] * model.unknown_rate + noise,
-        unreached=unreached,
-        targets=targets,
-        reached=unreached[targets.action, targets.hypothesis] + observed * arrivals.ravel()[reached],
-    )
-    return expected_entropies(model, joint, float(total[-1]))
+    return expected_entropies(model, next_pattern_joint(model, mass), float(mass.sum(axis=1)[-1]))

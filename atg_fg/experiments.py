@@ -15,15 +15,16 @@ import numpy as np
 
 from atg_fg.arcube import make_arcubes
 from atg_fg.assumptions import arcube_assumptions
-from atg_fg.engines import ENGINES, begin_trial
+from atg_fg.engines import begin_trial, check_engine
 from atg_fg.engines.base import Inference
-from atg_fg.errors import InvalidInputError, unknown_name
+from atg_fg.errors import InvalidInputError
 from atg_fg.memory import RobotMemory
 from atg_fg.parameters import ModelParameters
 from atg_fg.policies import make_policy
 from atg_fg.smoothed_learning import smoothed_patterns
 from atg_fg.statistics import mean, standard_error, wilson_interval
 from atg_fg.store import make_folder
+from atg_fg.structure.memory import empty_memory
 from atg_fg.trial import TrialRecord, run_trial
 from atg_fg.trial_log import TrialLog, TrialOutcome
 from atg_fg.worlds import WORLDS, World, make_world
@@ -62,8 +63,7 @@ class TestPlan:
         for name in ("n_actions", "n_trials", "n_objects"):
             if getattr(self, name) < 1:
                 raise InvalidInputError(f"{name}: {getattr(self, name)}; expected a whole number of at least 1")
-        if self.engine not in ENGINES:
-            raise unknown_name("engine", self.engine, ENGINES)
+        check_engine(self.engine, self.parameters)
         make_policy(self.policy)
 
     def make_world(self, cubes_seed: int) -> World:
@@ -118,7 +118,7 @@ def run_test(
         InvalidInputError: The records are of another test, or already there while ``resume`` is false.
     """
     cubes_seed, *trial_seeds = np.random.SeedSequence(seed).spawn(1 + plan.n_trials)
-    memory = RobotMemory(arcube_assumptions(plan.n_objects))
+    memory = empty_memory(arcube_assumptions(plan.n_objects), plan.parameters)
     log = _open_log(plan, seed, records, memory)
     score = _Score()
     if log is not None:
@@ -145,9 +145,16 @@ def _open_log(plan: TestPlan, seed: int, records: Path | None, memory: RobotMemo
         return None
     make_folder(records)
     # What is as usual is left out, so that a plan may get more to say and old records still be gone on with.
-    usual = asdict(TestPlan())
-    header = {"seed": seed, **{name: value for name, value in asdict(plan).items() if value != usual[name]}}
+    usual = _described(TestPlan())
+    header = {"seed": seed, **{name: value for name, value in _described(plan).items() if value != usual[name]}}
     return TrialLog(records / f"test-{seed:04}.jsonl.gz", header, memory.assumptions)
+
+
+def _described(plan: TestPlan) -> dict[str, Any]:
+    description = asdict(plan)
+    if not plan.parameters.learn_structure:
+        del description["parameters"]["learn_structure"]
+    return description
 
 
 def _smoothed(inference: Inference, record: TrialRecord) -> list[int | None] | None:
@@ -165,7 +172,9 @@ def learn_from(record: TrialRecord | TrialOutcome, memory: RobotMemory) -> str |
     """
     if record.verdict in ("lost", "undecided") or all(pattern is None for pattern in record.patterns):
         return None
-    return memory.learn(list(record.patterns), list(record.actions), record.matched)
+    name = memory.learn(list(record.patterns), list(record.actions), record.matched)
+    memory.learn_shared(name, record.detections, record.actions)
+    return name
 
 
 class _Score:

@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from atg_fg.assumptions import Assumptions
 from atg_fg.errors import InvalidInputError, unknown_name
 from atg_fg.graph import AspectTransitionGraph
+from atg_fg.patterns import Detection
 
 
 class RobotMemory:
@@ -60,6 +61,15 @@ class RobotMemory:
         graph.learn(patterns, actions)
         self._graphs[graph.name] = graph
         return graph.name
+
+    def learn_shared(self, name: str, detections: Sequence[Detection], actions: Sequence[int]) -> None:
+        """Learn from a raw trial what all objects share: nothing, in a memory that takes each object by itself.
+
+        Args:
+            name: Name of the ATG that the trial went to.
+            detections: The symbol in each slot at each look, ``None`` where nothing was seen, length t + 1.
+            actions: Index of the action between each two, length t.
+        """
 
     def _new_name(self) -> str:
         number = len(self)

@@ -17,6 +17,8 @@ class ModelParameters:
             beside the counted transitions.
         observation_noise: 0 ≤ δ < 1, the probability that a look shows a pattern drawn uniformly.
         learn_in_trial: Extend every hypothesis, *unseen* too, as the trial goes.
+        learn_structure: Objects may follow one structure that all share, learned from all trials; only the engine
+            ``learned-structure`` knows of it, and the memory has to be a ``StructuredMemory``.
 
     Raises:
         InvalidInputError: A value out of its range or not finite.
@@ -25,6 +27,7 @@ class ModelParameters:
     transition_concentration: float = 1e-8
     observation_noise: float = 1e-8
     learn_in_trial: bool = True
+    learn_structure: bool = False
 
     def __post_init__(self) -> None:
         alpha, delta = self.transition_concentration, self.observation_noise
@@ -32,8 +35,9 @@ class ModelParameters:
             raise InvalidInputError(f"transition_concentration: {alpha!r}; expected a finite number of at least 0")
         if not _is_finite_number(delta) or not 0 <= delta < 1:
             raise InvalidInputError(f"observation_noise: {delta!r}; expected a number from 0 to below 1")
-        if not isinstance(self.learn_in_trial, bool):
-            raise InvalidInputError(f"learn_in_trial: {self.learn_in_trial!r}; expected true or false")
+        for name in ("learn_in_trial", "learn_structure"):
+            if not isinstance(getattr(self, name), bool):
+                raise InvalidInputError(f"{name}: {getattr(self, name)!r}; expected true or false")
 
 
 def _is_finite_number(value: object) -> bool:

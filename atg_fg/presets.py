@@ -44,11 +44,13 @@ def _packaged(name: str) -> ModelParameters:
 
 
 #: ``paper`` takes the paper at its word, and assumes next to no noise; ``default`` also learns within the trial;
-#: ``robot`` assumes the noise that was measured on the simulated robot.
+#: ``robot`` assumes the noise that was measured on the simulated robot; ``learned`` is ``default`` for objects that may
+#: follow a structure which all share, learned from all trials.
 PRESETS: Final[Mapping[str, ModelParameters]] = {
     "paper": ModelParameters(1e-8, 1e-8, learn_in_trial=False),
     "default": ModelParameters(1e-8, 1e-8, learn_in_trial=True),
     "robot": _packaged("robot"),
+    "learned": ModelParameters(1e-8, 1e-8, learn_in_trial=True, learn_structure=True),
 }
 
 

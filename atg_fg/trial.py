@@ -94,6 +94,11 @@ class TrialRecord:
         return [step.pattern for step in self.steps]
 
     @property
+    def detections(self) -> list[Detection]:
+        """The symbol seen in each slot at each look, ``None`` where nothing was."""
+        return [step.detection for step in self.steps]
+
+    @property
     def actions(self) -> list[int]:
         """Index of each action, in order."""
         return [step.action for step in self.steps if step.action is not None]

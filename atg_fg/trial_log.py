@@ -35,6 +35,7 @@ class TrialOutcome:
         patterns: Index of the pattern to learn from at each look, ``None`` where it was not complete.
         actions: Index of each action.
         object: What was presented, by the world's truth.
+        detections: The symbol seen in each slot at each look, ``None`` where nothing was.
     """
 
     verdict: Verdict
@@ -42,13 +43,15 @@ class TrialOutcome:
     patterns: tuple[int | None, ...]
     actions: tuple[int, ...]
     object: object
+    detections: tuple[Detection, ...]
 
     @classmethod
     def of(cls, record: TrialRecord, patterns: Sequence[int | None] | None = None) -> TrialOutcome:
         """Return the outcome of a trial that has just been run, with ``patterns`` in place of those seen if given."""
         truth = record.steps[0].truth["object"]
         seen = record.patterns if patterns is None else patterns
-        return cls(record.verdict, record.matched, tuple(seen), tuple(record.actions), truth)
+        detections = tuple(record.detections)
+        return cls(record.verdict, record.matched, tuple(seen), tuple(record.actions), truth, detections)
 
 
 class TrialLog:
@@ -111,6 +114,7 @@ class TrialLog:
                 tuple(line.get("learned", [Evidence.of_detection(alphabet, each).pattern for each in seen])),
                 tuple(names.index(action) for action in line["actions"]),
                 line["truth"][0]["object"],
+                tuple(seen),
             )
         except (KeyError, IndexError, TypeError, ValueError) as error:
             raise InvalidInputError(f"{self.path}: {error!r}; expected a trial a line") from error

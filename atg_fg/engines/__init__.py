@@ -12,11 +12,12 @@ from atg_fg.engines.enumeration import Enumeration
 from atg_fg.engines.gibbs_sampling import GibbsSampling
 from atg_fg.engines.gtsam_elimination import GtsamElimination
 from atg_fg.engines.gtsam_routes import GtsamMarginals, GtsamMultifrontal, GtsamSequential
+from atg_fg.engines.learned_structure import LearnedStructure
 from atg_fg.engines.loopy_belief_propagation import LoopyBeliefPropagation
 from atg_fg.engines.mean_field import MeanField
 from atg_fg.engines.options import check_known
 from atg_fg.engines.particle_filter import ParticleFilter
-from atg_fg.errors import unknown_name
+from atg_fg.errors import InvalidInputError, unknown_name
 from atg_fg.memory import RobotMemory
 from atg_fg.parameters import ModelParameters
 
@@ -33,8 +34,23 @@ ENGINES: Final[dict[str, type[Inference]]] = {
         ParticleFilter,
         GibbsSampling,
         MeanField,
+        LearnedStructure,
     )
 }
+
+
+def check_engine(engine: str, parameters: ModelParameters) -> None:
+    """Check that there is an engine of this name, and that it knows the model that these parameters mean.
+
+    Raises:
+        UnknownNameError: No engine has this name.
+        InvalidInputError: The engine does not know of structures that objects share.
+    """
+    if engine not in ENGINES:
+        raise unknown_name("engine", engine, ENGINES)
+    if parameters.learn_structure and not ENGINES[engine].knows_structure:
+        able = ", ".join(name for name, each in ENGINES.items() if each.knows_structure)
+        raise InvalidInputError(f"engine {engine!r}: does not know learn_structure; expected one of: {able}")
 
 
 def begin_trial(
@@ -55,11 +71,10 @@ def begin_trial(
 
     Raises:
         UnknownNameError: No engine has this name.
-        InvalidInputError: The engine has no such option, it does not take this value, or the prior is not a
-            distribution over the objects of this memory.
+        InvalidInputError: The engine does not know of structures that objects share, has no such option, or does not
+            take this value; or the prior is not a distribution over the objects of this memory.
     """
-    if engine not in ENGINES:
-        raise unknown_name("engine", engine, ENGINES)
+    check_engine(engine, parameters)
     check_known(ENGINES[engine], engine, options)
     begin: Callable[..., Inference] = ENGINES[engine]
     return begin(memory, parameters, prior, **options)

@@ -20,7 +20,8 @@ from atg_fg.situations import Situation, shown_patterns_of, situations_of
 class Inference(ABC):
     """Inference in one trial: look, act, look, act …, and ask for the posterior at any time.
 
-    A subclass is an engine. It says by ``exact`` whether its posteriors are those of the model.
+    A subclass is an engine. It says by ``exact`` whether its posteriors are those of the model, and by
+    ``knows_structure`` whether it can let objects follow a structure that all share.
 
     Args:
         memory: The robot memory when the trial begins; it is not changed.
@@ -30,6 +31,7 @@ class Inference(ABC):
 
     name: ClassVar[str]
     exact: ClassVar[bool]
+    knows_structure: ClassVar[bool] = False
 
     def __init__(self, memory: RobotMemory, parameters: ModelParameters, prior: IdentityBelief | None = None) -> None:
         self.memory = memory

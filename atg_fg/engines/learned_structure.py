@@ -1,0 +1,194 @@
+"""Recognition where objects may follow a structure that all of them share, learned from all trials in memory.
+
+Each object either follows one of the structures that are believed in, or is a plain ATG. So next to the Bayes filter of
+the plain ATGs there is a filter over pose and contents for each structure, and the belief over identity sums over them.
+A memory that has learned no structure leaves the Bayes filter alone.
+"""
+
+from __future__ import annotations
+
+from typing import ClassVar, Final
+
+import numpy as np
+
+from atg_fg.belief import IdentityBelief, log_sum_exp
+from atg_fg.engines.bayes_filter import BayesFilter, forward_backward
+from atg_fg.expected_entropy import expected_entropies_of_table, next_pattern_joint, pattern_table
+from atg_fg.memory import RobotMemory
+from atg_fg.model import COLLECTION
+from atg_fg.parameters import ModelParameters
+from atg_fg.patterns import Evidence, FloatArray
+from atg_fg.structure.learner import BelievedStructure
+from atg_fg.structure.memory import StructuredMemory
+from atg_fg.structure.pose_chain import pose_chain, pose_patterns
+from atg_fg.structure.pose_filter import UNIMPORTANT, PoseFilter
+from atg_fg.structure.rates import Rates
+
+#: A structure less probable than this, given the trial so far, is left out of the rest of it.
+RULED_OUT: Final = 1e-9
+
+
+class LearnedStructure(BayesFilter):
+    """Bayes filtering of plain ATGs and, beside them, of pose and contents under learned structures.
+
+    Not exact: few structures stand for all, and contents that slips leave in doubt are merged by their mean
+    (``atg_fg/structure/pose_filter.py``). What is impossible for plain ATGs is refused.
+    """
+
+    name: ClassVar[str] = "learned-structure"
+    exact: ClassVar[bool] = False
+    knows_structure: ClassVar[bool] = True
+
+    def __init__(self, memory: RobotMemory, parameters: ModelParameters) -> None:
+        super().__init__(memory, parameters)
+        believed: list[BelievedStructure] = []
+        rates = Rates()
+        if parameters.learn_structure and isinstance(memory, StructuredMemory):
+            believed, rates = memory.learner.believed(memory.names), memory.learner.rates
+        self._log_prior = np.log(self.model.prior)
+        followers = [each.weight * np.append(each.followers, rates.share) for each in believed]
+        with np.errstate(divide="ignore"):  # −∞ for what an object cannot be
+            self._log_plain = self._log_prior + np.log(1.0 - sum(followers, np.zeros(self.model.n_hypotheses)))
+            log_weights = [self._log_prior + np.log(each) for each in followers]
+        self._followed = [
+            FollowedStructure(each, weights, rates, memory) for each, weights in zip(believed, log_weights, strict=True)
+        ]
+
+    def observe(self, evidence: Evidence) -> None:
+        """Take in the evidence z_t of a look, then learn from it if the parameters say so.
+
+        Raises:
+            InvalidInputError: It is an action's turn, or the evidence is not over this alphabet.
+            ImpossibleEvidenceError: The evidence has probability zero for plain ATGs; nothing has changed.
+        """
+        super().observe(evidence)
+        for each in self._followed:
+            each.observe(evidence)
+        if self._followed:
+            least = self.log_evidence + np.log(RULED_OUT)
+            self._followed = [each for each in self._followed if log_sum_exp(each.log_joint) > least]
+
+    def act(self, action: int) -> None:
+        """Predict the effect of an action a_{t+1}.
+
+        Raises:
+            InvalidInputError: It is an observation's turn, or there is no such action.
+        """
+        super().act(action)
+        for each in self._followed:
+            each.filter.act(self.history.actions[-1])
+
+    def identity(self) -> IdentityBelief:
+        """Return p(O | z_0:t, a_1:t) (eq. 1 and 2)."""
+        if not self._followed:
+            return super().identity()
+        probabilities = sum(self._type_beliefs(), np.zeros(self.model.n_hypotheses))
+        return IdentityBelief(probabilities[:-1], float(probabilities[-1]), self.model.n_unseen)
+
+    @property
+    def log_evidence(self) -> float:
+        """Return ln p(z_0:t | a_1:t)."""
+        if not self._followed:
+            return super().log_evidence
+        return log_sum_exp(np.concatenate(self._log_joints()))
+
+    def _log_joints(self) -> list[FloatArray]:
+        """Return ln p(O, type, z_0:t | a_1:t) of being plain, then of following each structure, each of shape [H]."""
+        plain = self._log_plain + self._belief.log_identity + self._log_evidence - self._log_prior
+        return [plain, *(each.log_joint for each in self._followed)]
+
+    def _type_beliefs(self) -> list[FloatArray]:
+        """Return p(O, type | z_0:t, a_1:t) of being plain, then of following each structure, each of shape [H]."""
+        joints = self._log_joints()
+        total = log_sum_exp(np.concatenate(joints))
+        return [np.exp(joint - total) for joint in joints]
+
+    def _expected_entropies(self) -> FloatArray:
+        """Return eq. 3 for each action, shape [A], from p(O, z | a) summed over types, poses and contents."""
+        if not self._followed:
+            return super()._expected_entropies()
+        beliefs = self._type_beliefs()
+        identity = sum(beliefs, np.zeros(self.model.n_hypotheses))
+        table = np.zeros((self.model.n_actions, self.model.n_hypotheses, self.model.n_patterns))
+        if beliefs[0].sum() > UNIMPORTANT:
+            table += pattern_table(
+                self.model, next_pattern_joint(self.model, beliefs[0][:, None] * self._belief.aspects)
+            )
+        for each, belief in zip(self._followed, beliefs[1:], strict=True):
+            owners, patterns = each.filter.predicted_patterns()
+            table[:, owners] += belief[owners, None] * patterns
+        matters = np.flatnonzero(identity > UNIMPORTANT)
+        matters = np.union1d(matters, [self.model.n_hypotheses - 1])  # unseen is always the last
+        return expected_entropies_of_table(table[:, matters], float(identity[-1]), self.model.n_unseen)
+
+    def _smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
+        """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s, of plain ATGs and poses together.
+
+        A pose counts as the aspect that shows the pose's pattern, or as the collection node if none does.
+        """
+        marginals = super()._smoothed_aspects(hypothesis)
+        weights = [float(belief[hypothesis]) for belief in self._type_beliefs()]
+        if not sum(weights[1:]) > 0:
+            return marginals
+        plain = weights[0] / sum(weights)
+        mixed = [plain * marginal for marginal in marginals]
+        for each, weight in zip(self._followed, weights[1:], strict=True):
+            patterns = each.smoothed_patterns(hypothesis, self) if weight > 0 else []
+            for aspects, shown in zip(mixed, patterns, strict=False):
+                states = self.model.aspect_of[hypothesis].copy()
+                states[states >= len(aspects)] = COLLECTION  # not known yet at that time
+                aspects += weight / sum(weights) * np.bincount(states, shown, len(aspects))
+        return mixed
+
+
+class FollowedStructure:
+    """One believed structure in a trial.
+
+    Args:
+        believed: The structure, and what it says of the remembered objects.
+        log_weights: ln p(O, the object follows it), shape [H].
+        rates: Those in force.
+        memory: For its assumptions.
+
+    Attributes:
+        filter: Over the pose and contents of each object and of *unseen*.
+    """
+
+    def __init__(self, believed: BelievedStructure, log_weights: FloatArray, rates: Rates, memory: RobotMemory) -> None:
+        self._poses, self._rates, self._alphabet = believed.structure.poses(), rates, memory.assumptions.alphabet
+        self._log_weights = log_weights
+        new = np.zeros((1, *believed.contents.shape[1:]))
+        contents = np.concatenate((believed.contents, new))
+        self.filter = PoseFilter(self._poses, contents, rates, self._alphabet, log_weights)
+
+    @property
+    def log_joint(self) -> FloatArray:
+        """Ln p(O, the object follows this structure, z_0:t | a_1:t), shape [H]."""
+        return self._log_weights + self.filter.log_evidence
+
+    def observe(self, evidence: Evidence) -> None:
+        """Take in the evidence of a look."""
+        if evidence.pattern is None:
+            self.filter.observe_likelihood(evidence.likelihood)
+        else:
+            self.filter.observe_pattern(self._alphabet.symbols[evidence.pattern])
+
+    def smoothed_patterns(self, hypothesis: int, inference: LearnedStructure) -> list[FloatArray]:
+        """Return p(pattern shown at time s | O = hypothesis, all evidence) of every time s, each of shape [|𝒵|].
+
+        The contents are those that the trial has left, taken as known.
+        """
+        learned = self.filter.learned_contents(hypothesis)
+        if learned is None:
+            return []
+        contents, evidence = learned[None], inference.history.evidence
+        chain = pose_chain(self._poses, contents, np.ones(1), self._rates, self._alphabet, inference.history)
+        shown = pose_patterns(self._poses, contents, self._rates, self._alphabet)[0]
+        patterns = []
+        for time, marginal in enumerate(forward_backward(chain)):
+            likelihood = np.ones(len(self._alphabet)) if time >= len(evidence) else evidence[time].likelihood
+            noise = self._rates.wrong / len(self._alphabet) * likelihood.sum()
+            given_pose = shown * ((1.0 - self._rates.wrong) * likelihood + noise)
+            total = given_pose.sum(axis=1)
+            patterns.append((marginal / np.where(total > 0, total, 1.0)) @ given_pose)
+        return patterns

@@ -1,0 +1,71 @@
+"""A robot memory that also learns what all its objects share."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterable, Sequence
+
+from atg_fg.assumptions import Assumptions
+from atg_fg.graph import AspectTransitionGraph
+from atg_fg.memory import RobotMemory
+from atg_fg.parameters import ModelParameters
+from atg_fg.patterns import Detection
+from atg_fg.structure.learner import StructureLearner
+from atg_fg.structure.trials import RawTrial
+
+
+class StructuredMemory(RobotMemory):
+    """ATGs by name, and beside them the raw trials they were made from and the structure learned from all of these.
+
+    Args:
+        assumptions: |O|, |G|, actions and alphabet.
+        graphs: ATGs under the same assumptions, with unique names.
+        learner: Its trials are of these ATGs; one that knows nothing yet if not given.
+
+    Raises:
+        InvalidInputError: A repeated name, or a graph made under other assumptions.
+
+    Attributes:
+        learner: The raw trials and the structures learned from them.
+    """
+
+    def __init__(
+        self,
+        assumptions: Assumptions,
+        graphs: Iterable[AspectTransitionGraph] = (),
+        learner: StructureLearner | None = None,
+    ) -> None:
+        super().__init__(assumptions, graphs)
+        self.learner = learner or StructureLearner(assumptions)
+
+    def learn_shared(self, name: str, detections: Sequence[Detection], actions: Sequence[int]) -> None:
+        """Keep a raw trial, and learn from it what all objects share.
+
+        Args:
+            name: Name of the ATG that the trial went to.
+            detections: The symbol in each slot at each look, ``None`` where nothing was seen, length t + 1.
+            actions: Index of the action between each two, length t.
+
+        Raises:
+            UnknownNameError: There is no such ATG.
+            InvalidInputError: It is no trial under these assumptions.
+        """
+        trial = RawTrial(tuple(detections), tuple(actions))
+        trial.check(self.assumptions)
+        self.learner.learn(self[name].name, trial)
+
+    def copy(self) -> StructuredMemory:
+        """Return a memory that can learn without touching this one."""
+        return StructuredMemory(self.assumptions, (graph.copy() for graph in self), copy.deepcopy(self.learner))
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, StructuredMemory):
+            return NotImplemented
+        return super().__eq__(other) and self.learner.same_as(other.learner)
+
+    __hash__ = None
+
+
+def empty_memory(assumptions: Assumptions, parameters: ModelParameters) -> RobotMemory:
+    """Return an empty memory that learns what the parameters say is to be learned."""
+    return (StructuredMemory if parameters.learn_structure else RobotMemory)(assumptions)

@@ -1,0 +1,269 @@
+"""A Bayes filter over pose and contents of objects that follow a known structure, many objects side by side.
+
+What is believed of an object is a set of rows: a pose, its probability, and a soft table of contents given that pose.
+A look weighs the rows and reveals registers; an action turns each pose, and leaves a second row behind for a slip. Rows
+of one object that come to the same pose become one, whose table has their mean. That is the approximation: the rest of
+what they knew, how registers depend on each other and on the way the pose was reached, is given up. A known object, and
+a new one that never slips, never has two rows in one pose, and is filtered exactly.
+"""
+
+from __future__ import annotations
+
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from atg_fg.belief import log_sum_exp
+from atg_fg.patterns import FloatArray, IntArray, PatternAlphabet
+from atg_fg.structure import contents as soft
+from atg_fg.structure.rates import Rates
+from atg_fg.structure.shared_structure import Poses
+
+#: Rows less probable than this are dropped.
+NEGLIGIBLE: Final = 1e-9
+#: Rows less probable than this are left out of what is predicted for planning.
+UNIMPORTANT: Final = 1e-6
+#: Columns of ``Rows.events``.
+SLIP, WRONG, REPEAT, REVEAL = range(4)
+
+
+class Rows(NamedTuple):
+    """What is believed, a row for each owner and pose that is not negligible, in this order.
+
+    Attributes:
+        owner: The object, or trial, that a row is about, shape [R].
+        pose: Shape [R].
+        weight: p(pose | owner, what was seen), shape [R].
+        table: Index of the row's table of contents, shape [R]; rows that know the same share one.
+        events: Expected slips, wrong looks, repeated symbols and revealed registers so far, shape [R, 4].
+    """
+
+    owner: IntArray
+    pose: IntArray
+    weight: FloatArray
+    table: IntArray
+    events: FloatArray
+
+    def take(self, index: IntArray) -> Rows:
+        """Return the rows with these indices."""
+        return Rows(self.owner[index], self.pose[index], self.weight[index], self.table[index], self.events[index])
+
+
+class PoseFilter:
+    """Filters the pose of H owners: objects that one trial may be about, or trials that each have their own object.
+
+    Args:
+        poses: Of the structure.
+        contents: What is known of each owner's registers, shape [H, P, S]; all zero for a new object.
+        rates: Slip, wrong looks and repeated symbols.
+        alphabet: The patterns.
+        log_weights: ln of the weight of each owner, shape [H], if they are rivals for one trial, so that rows which
+            are negligible beside those of other owners are dropped. Without, each owner is a trial of its own.
+
+    Attributes:
+        log_evidence: ln p(what was seen | owner), shape [H].
+    """
+
+    def __init__(
+        self,
+        poses: Poses,
+        contents: FloatArray,
+        rates: Rates,
+        alphabet: PatternAlphabet,
+        log_weights: FloatArray | None = None,
+    ) -> None:
+        self._poses, self._rates, self._alphabet = poses, rates, alphabet
+        self._log_weights = log_weights
+        n_owners, n_poses = len(contents), len(poses.registers)
+        # A new object's registers have no names yet, so any pose is as good as another.
+        n_first = np.where(contents.any(axis=(1, 2)), n_poses, 1)
+        owner = np.repeat(np.arange(n_owners), n_first)
+        pose = np.arange(len(owner)) - np.repeat(np.cumsum(n_first) - n_first, n_first)
+        self.rows = Rows(owner, pose, 1.0 / n_first[owner], owner, np.zeros((len(owner), 4)))
+        self._contents = contents
+        self._shown = soft.symbol_probabilities(contents, rates.repeat)
+        self.log_evidence = np.zeros(n_owners)
+
+    def act(self, action: int) -> None:
+        """Take in an action."""
+        self.act_apart(np.full(len(self.log_evidence), action))
+
+    def act_apart(self, actions: IntArray) -> None:
+        """Take in an action of each owner, shape [H]."""
+        rows, slip = self.rows, self._rates.slip
+        moved = rows._replace(
+            pose=self._poses.successors[rows.pose, actions[rows.owner]], weight=rows.weight * (1.0 - slip)
+        )
+        slipped = rows.events.copy()
+        slipped[:, SLIP] += 1.0
+        stayed = rows._replace(weight=rows.weight * slip, events=slipped)
+        self.rows = Rows(*(np.concatenate(pair) for pair in zip(moved, stayed, strict=True)))
+
+    def observe_pattern(self, symbols: IntArray) -> None:
+        """Take in looks that showed every slot, shape [J], or [H, J] for a look of each owner."""
+        rows = self.rows
+        seen = np.broadcast_to(symbols, (len(self.log_evidence), symbols.shape[-1]))[rows.owner]
+        registers, shown = self._in_view(rows)
+        probability = 1.0 / soft.distinctness(shown, self._alphabet.symbols)
+        index = np.arange(len(rows.owner))
+        for slot, probabilities in enumerate(shown):
+            probability *= probabilities[index, seen[:, slot]]
+        kept, truth = self._condition(probability, np.ones(1))
+        seen, index = seen[kept], np.arange(len(kept))
+        tables = self._contents[self.rows.table]
+        known = np.ones(len(kept), dtype=bool)
+        for slot, probabilities in enumerate(shown):
+            register = registers[kept, slot]
+            before = tables[index, register]
+            known &= before[index, seen[:, slot]] > 1.0 - soft.TINY
+            tables[index, register] = soft.reveal(before, seen[:, slot], truth)
+            self._count_reveals(before, probabilities[kept, seen[:, slot]], seen[:, slot], truth)
+        self._merge(tables, changed=~known & (truth > soft.TINY))
+
+    def observe_likelihood(self, likelihood: FloatArray) -> None:
+        """Take in any evidence as a likelihood of each pattern, shape [|𝒵|], or [H, |𝒵|] for a look of each owner."""
+        rows, symbols = self.rows, self._alphabet.symbols
+        likelihood = np.broadcast_to(likelihood, (len(self.log_evidence), len(symbols)))
+        registers, shown = self._in_view(rows)
+        joint = soft.pattern_products(shown, symbols) / soft.distinctness(shown, symbols)[:, None]
+        joint *= likelihood[rows.owner]
+        probability = joint.sum(axis=1)
+        kept, truth = self._condition(probability, likelihood.sum(axis=1))
+        joint = joint[kept] / np.maximum(probability[kept], soft.TINY**20)[:, None]
+        one_hot = [symbols[:, slot, None] == np.arange(self._alphabet.n_symbols) for slot in range(len(shown))]
+        posteriors = [joint @ each.astype(np.float64) for each in one_hot]
+        tables = self._contents[self.rows.table]
+        index = np.arange(len(kept))
+        for slot, posterior in enumerate(posteriors):
+            register = registers[kept, slot]
+            taken = sum((each for other, each in enumerate(posteriors) if other != slot), np.zeros_like(posterior))
+            tables[index, register] = soft.reweigh(tables[index, register], shown[slot][kept], posterior, taken, truth)
+        self._merge(tables, changed=truth > soft.TINY)
+
+    def predicted_patterns(self) -> tuple[IntArray, FloatArray]:
+        """Return the owners that matter, shape [I], and p(next pattern | action, owner) of each, shape [A, I, |𝒵|]."""
+        rows = self.rows.take(np.flatnonzero(self.rows.weight * self._importance()[self.rows.owner] > UNIMPORTANT))
+        first = np.flatnonzero(np.diff(rows.owner, prepend=-1))
+        weights = rows.weight / np.add.reduceat(rows.weight, first)[np.cumsum(np.diff(rows.owner, prepend=-1) > 0) - 1]
+        stayed = self._patterns_of(rows, weights * self._rates.slip, first)
+        moved = [
+            self._patterns_of(rows._replace(pose=successors), weights * (1.0 - self._rates.slip), first)
+            for successors in self._poses.successors[rows.pose].T
+        ]
+        noise = self._rates.wrong / len(self._alphabet)
+        return rows.owner[first], (1.0 - self._rates.wrong) * (np.array(moved) + stayed) + noise
+
+    def learned_contents(self, owner: int) -> FloatArray | None:
+        """Return the table of an owner's most probable pose if it is at least even, else their mean, shape [P, S].
+
+        ``None`` if the owner has been ruled out.
+        """
+        own = np.flatnonzero(self.rows.owner == owner)
+        if not len(own):
+            return None
+        weight, table = self.rows.weight[own], self.rows.table[own]
+        best = int(weight.argmax())
+        if weight[best] >= 0.5 * weight.sum():
+            table = table[[best]]
+            weight = np.ones(1)
+        mean: FloatArray = np.einsum("r,rps->ps", weight / weight.sum(), self._contents[table])
+        return mean
+
+    def expected_events(self) -> FloatArray:
+        """Return the expected slips, wrong looks, repeated symbols and revealed registers of each owner, [H, 4]."""
+        events = np.zeros((len(self.log_evidence), 4))
+        np.add.at(events, self.rows.owner, self.rows.weight[:, None] * self.rows.events)
+        return events
+
+    def _in_view(self, rows: Rows) -> tuple[IntArray, list[FloatArray]]:
+        """Return the register in each slot, shape [R, J], and for each slot the symbols' probabilities, shape [R, S]."""
+        registers = self._poses.registers[rows.pose, : len(self._alphabet.slots)]
+        return registers, [self._shown[rows.table, register] for register in registers.T]
+
+    def _condition(self, probability: FloatArray, scale: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Weigh the rows by a look, drop the negligible ones, and count how many looks were wrong.
+
+        Args:
+            probability: Of the look under each row if it is not wrong, shape [R].
+            scale: The look's sum over patterns, for each owner or for all, shape [H] or [1].
+
+        Returns:
+            Which rows are left, and how probable it is that the look was not wrong under each of them.
+        """
+        rows, n_owners = self.rows, len(self.log_evidence)
+        right = (1.0 - self._rates.wrong) * probability
+        wrong = self._rates.wrong / len(self._alphabet) * np.broadcast_to(scale, n_owners)[rows.owner]
+        weight = rows.weight * (right + wrong)
+        total = np.bincount(rows.owner, weight, n_owners)
+        self.log_evidence += np.log(total, out=np.full(n_owners, -np.inf), where=total > 0)
+        weight = weight / np.maximum(total, np.finfo(float).tiny)[rows.owner]
+        kept = np.flatnonzero(weight * self._importance()[rows.owner] > NEGLIGIBLE)
+        truth = right[kept] / (right + wrong)[kept]
+        self.rows = rows._replace(weight=weight).take(kept)
+        self.rows.events[:, WRONG] += 1.0 - truth
+        return kept, truth
+
+    def _importance(self) -> FloatArray:
+        """Return the weight of each owner relative to the greatest, shape [H]; one for each that has no rivals."""
+        if self._log_weights is None:
+            return np.ones(len(self.log_evidence))
+        logarithms = self._log_weights + self.log_evidence
+        total = log_sum_exp(logarithms)
+        return np.exp(logarithms - total) if np.isfinite(total) else np.zeros_like(logarithms)
+
+    def _count_reveals(self, before: FloatArray, shown: FloatArray, symbol: IntArray, truth: FloatArray) -> None:
+        """Count how probably a slot's register was revealed by the look, and its symbol drawn from all symbols."""
+        shown = np.maximum(shown, soft.TINY)
+        known = before[np.arange(len(before)), symbol]
+        revealed = truth * np.maximum(1.0 - known / shown, 0.0)
+        repeated = truth * soft.unrevealed(before[:, None, :])[:, 0]
+        repeated *= self._rates.repeat / self._alphabet.n_symbols / shown
+        self.rows.events[:, REVEAL] += revealed
+        self.rows.events[:, REPEAT] += np.minimum(repeated, revealed)
+
+    def _merge(self, tables: FloatArray, changed: np.ndarray) -> None:
+        """Make one row of those with the same owner and pose, and keep each different table once.
+
+        Args:
+            tables: Of each row, shape [R, P, S].
+            changed: Which of them differ from those that the rows had before, shape [R].
+        """
+        rows, n_old = self.rows, len(self._contents)
+        table = rows.table.copy()
+        table[changed] = n_old + np.arange(int(changed.sum()))
+        key = rows.owner * len(self._poses.registers) + rows.pose
+        order = np.argsort(key, kind="stable")
+        first = np.flatnonzero(np.diff(key[order], prepend=-1))
+        group = np.cumsum(np.diff(key[order], prepend=-1) > 0) - 1
+        weight = np.add.reduceat(rows.weight[order], first)
+        share = rows.weight[order] / np.maximum(weight, np.finfo(float).tiny)[group]
+        events = np.add.reduceat(rows.events[order] * share[:, None], first)
+        lowest = np.minimum.reduceat(table[order], first)
+        mixed = lowest != np.maximum.reduceat(table[order], first)
+        new = [tables[changed]]
+        if mixed.any():
+            members = np.flatnonzero(mixed[group])
+            starts = np.flatnonzero(np.diff(group[members], prepend=-1))
+            weighted = tables[order[members]] * share[members][:, None, None]
+            new.append(np.add.reduceat(weighted, starts))
+            lowest[mixed] = n_old + int(changed.sum()) + np.arange(int(mixed.sum()))
+        used, table = np.unique(lowest, return_inverse=True)
+        made = np.concatenate(new)[used[used >= n_old] - n_old]
+        kept = used[used < n_old]
+        self._contents = np.concatenate((self._contents[kept], made))
+        self._shown = np.concatenate((self._shown[kept], soft.symbol_probabilities(made, self._rates.repeat)))
+        last = order[first]
+        self.rows = Rows(rows.owner[last], rows.pose[last], weight, table, events)
+
+    def _patterns_of(self, rows: Rows, weights: FloatArray, first: IntArray) -> FloatArray:
+        """Return the weighted sum of what rows show, for each owner, shape [I, |𝒵|]."""
+        _, shown = self._in_view(rows)
+        symbols = self._alphabet.symbols
+        shown[0] = shown[0] * (weights / soft.distinctness(shown, symbols))[:, None]
+        combined = shown[0]
+        for probabilities in shown[1:]:
+            combined = (combined[:, :, None] * probabilities[:, None, :]).reshape(len(combined), -1)
+        by_owner = np.add.reduceat(combined, first)
+        places = np.ravel_multi_index(tuple(symbols.T), (self._alphabet.n_symbols,) * symbols.shape[1])
+        patterns: FloatArray = by_owner[:, places]
+        return patterns
