@@ -24,7 +24,7 @@ from atg_fg.policies import make_policy
 from atg_fg.smoothed_learning import smoothed_patterns
 from atg_fg.statistics import mean, standard_error, wilson_interval
 from atg_fg.store import make_folder
-from atg_fg.structure.memory import empty_memory
+from atg_fg.structure.memory import memory_for
 from atg_fg.trial import TrialRecord, run_trial
 from atg_fg.trial_log import TrialLog, TrialOutcome
 from atg_fg.worlds import WORLDS, World, make_world
@@ -118,7 +118,7 @@ def run_test(
         InvalidInputError: The records are of another test, or already there while ``resume`` is false.
     """
     cubes_seed, *trial_seeds = np.random.SeedSequence(seed).spawn(1 + plan.n_trials)
-    memory = empty_memory(arcube_assumptions(plan.n_objects), plan.parameters)
+    memory = memory_for(plan.parameters, RobotMemory(arcube_assumptions(plan.n_objects)))
     log = _open_log(plan, seed, records, memory)
     score = _Score()
     if log is not None:

@@ -51,13 +51,13 @@ def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     return result
 
 
-def read_object(value: Any, place: str, keys: tuple[str, ...]) -> dict[str, Any]:
-    """Return ``value`` if it is an object with exactly these keys."""
+def read_object(value: Any, place: str, keys: tuple[str, ...], optional: tuple[str, ...] = ()) -> dict[str, Any]:
+    """Return ``value`` if it is an object with exactly these keys, and perhaps optional ones."""
     if not isinstance(value, dict):
         raise InvalidInputError(f"{place}: {_brief(value)}; expected an object with {', '.join(keys)}")
     for key in value:
-        if key not in keys:
-            raise InvalidInputError(f"{place}: unknown key {key!r}; expected {', '.join(keys)}")
+        if key not in keys + optional:
+            raise InvalidInputError(f"{place}: unknown key {key!r}; expected {', '.join(keys + optional)}")
     for key in keys:
         if key not in value:
             raise InvalidInputError(f"{place}: key {key!r} is missing; expected {', '.join(keys)}")

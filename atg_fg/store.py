@@ -19,6 +19,8 @@ from atg_fg.json_format import (
     write_graph,
 )
 from atg_fg.memory import RobotMemory
+from atg_fg.structure.json_section import read_learner, write_learner
+from atg_fg.structure.memory import StructuredMemory
 
 MEMORY_FORMAT: Final = "atg-fg/memory"
 
@@ -96,7 +98,7 @@ def _cannot_write(path: Path | str, error: Exception) -> InvalidInputError:
 
 
 def save_memory(memory: RobotMemory, path: Path | str) -> None:
-    """Save a robot memory as versioned JSON, atomically."""
+    """Save a robot memory, with the structure it has learned, as versioned JSON, atomically."""
     write_bytes_atomically(path, memory_to_json(memory).encode())
 
 
@@ -117,12 +119,19 @@ def memory_to_json(memory: RobotMemory) -> str:
         "assumptions": write_assumptions(memory.assumptions),
         "memory": [write_graph(graph) for graph in memory],
     }
+    if isinstance(memory, StructuredMemory):
+        document["structure"] = write_learner(memory.learner)
     return json.dumps(document, indent=1) + "\n"
 
 
 def memory_from_json(text: str, place: str = "memory") -> RobotMemory:
     """Return the robot memory in a JSON document; errors name ``place``."""
-    document = read_object(parse_json(text, place), place, ("format", "version", "assumptions", "memory"))
+    keys = ("format", "version", "assumptions", "memory")
+    document = read_object(parse_json(text, place), place, keys, optional=("structure",))
     check_format(document, MEMORY_FORMAT, place)
     assumptions = read_assumptions(document["assumptions"], f"{place}: assumptions")
-    return read_memory(document["memory"], assumptions, f"{place}: memory")
+    memory = read_memory(document["memory"], assumptions, f"{place}: memory")
+    if "structure" not in document:
+        return memory
+    learner = read_learner(document["structure"], assumptions, memory.names, f"{place}: structure")
+    return StructuredMemory(assumptions, memory, learner)

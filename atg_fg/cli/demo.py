@@ -19,6 +19,7 @@ from atg_fg.experiments import learn_from
 from atg_fg.memory import RobotMemory
 from atg_fg.policies import EntropyPolicy, RandomPolicy
 from atg_fg.presets import preset as preset_named
+from atg_fg.structure.memory import memory_for
 from atg_fg.trial import TrialRecord, run_trial
 from atg_fg.worlds import World, make_world
 
@@ -32,7 +33,7 @@ CAMERAS: Final[dict[str, dict[str, Any]]] = {
 
 def demo(
     world: options.World = "robonaut",
-    engine: options.Engine = "gtsam",
+    engine: options.PresetsEngine = None,
     preset: options.Preset = "default",
     actions: options.Actions = 8,
     novel: Annotated[bool, typer.Option("--novel", help="Present an object the robot has never met.")] = False,
@@ -53,11 +54,12 @@ def demo(
     options.check_at_least(0, seed=seed)
     options.check_json_option(json_file)
     parameters = preset_named(preset)
+    engine = options.engine_of(engine, parameters, "gtsam")
     figures.figure_class()  # fails now rather than at the end, if matplotlib is not installed
     folder = store.make_folder(output)
     console = options.console(json_file)
     learn_seed, trial_seed = np.random.SeedSequence(seed).spawn(2)
-    memory = RobotMemory(arcube_assumptions())
+    memory = memory_for(parameters, RobotMemory(arcube_assumptions()))
     begin_trial(engine, memory, parameters)
     # The last cube is the one the robot never meets while it learns.
     cubes = make_arcubes(N_REMEMBERED + 1, seed)
@@ -99,7 +101,8 @@ def _learn(world: World, memory: RobotMemory, rng: np.random.Generator) -> None:
     for cube in range(N_REMEMBERED):
         inference = begin_trial("bayes-filter", memory, preset_named("default"))
         record = run_trial(world, inference, RandomPolicy(), 12, rng, reset_options={"object": cube})
-        memory.learn(record.patterns, record.actions, matched=None)
+        name = memory.learn(record.patterns, record.actions, matched=None)
+        memory.learn_shared(name, record.detections, record.actions)
 
 
 def _save(folder: Path, world: World, record: TrialRecord, memory: RobotMemory) -> None:

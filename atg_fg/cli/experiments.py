@@ -26,7 +26,7 @@ FIGURE3_POLICIES = ("entropy", "random")
 
 def table1(
     world: options.World = "ideal",
-    engine: options.Engine = "gtsam",
+    engine: options.PresetsEngine = None,
     preset: options.Preset = "default",
     policy: options.Policy = "entropy",
     tests: options.Tests = 5,
@@ -56,12 +56,14 @@ def table1(
     if resume and records is None:
         raise InvalidInputError("--resume: no records to go on from; expected --records with their folder")
     world_options = options.world_options(slip, wrong, missing, condition, urdf)
+    model = preset_named(preset)
+    engine = options.engine_of(engine, model, "gtsam")
     plan = TestPlan(
         world=world,
         world_options=world_options,
         engine=engine,
         policy=policy,
-        parameters=preset_named(preset),
+        parameters=model,
         smoothed_learning=smoothed_learning,
         n_actions=actions,
         n_trials=trials,
@@ -122,7 +124,7 @@ def figure3(
     actions: Annotated[str, typer.Option(help="Numbers of actions, first:last or a list such as 4,6,10.")] = "4:20",
     tests: options.Tests = 10,
     world: options.World = "ideal",
-    engine: options.Engine = "bayes-filter",
+    engine: options.PresetsEngine = None,
     preset: options.Preset = "default",
     trials: options.Trials = 100,
     seed: options.Seed = 0,
@@ -147,11 +149,13 @@ def figure3(
         store.check_writable(csv_file)
     if plot is not None:
         figures.check_figure_path(plot)
+    model = preset_named(preset)
+    engine = options.engine_of(engine, model, "bayes-filter")
     plan = TestPlan(
         world=world,
         world_options=options.world_options(slip, wrong, missing),
         engine=engine,
-        parameters=preset_named(preset),
+        parameters=model,
         n_trials=trials,
     )
     seeds = range(seed, seed + tests)

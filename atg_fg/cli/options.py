@@ -16,7 +16,9 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from atg_fg import store
 from atg_fg.engines import ENGINES
+from atg_fg.engines.learned_structure import LearnedStructure
 from atg_fg.errors import InvalidInputError
+from atg_fg.parameters import ModelParameters
 from atg_fg.policies import POLICIES
 from atg_fg.presets import PRESETS
 from atg_fg.worlds import WORLDS, probability_option
@@ -29,6 +31,9 @@ def available_cpus() -> int:
 
 World = Annotated[str, typer.Option(help=f"World: {', '.join(WORLDS)}, or module:namespace/Id-v0 of your own.")]
 Engine = Annotated[str, typer.Option(help=f"Inference engine: {', '.join(ENGINES)}.")]
+PresetsEngine = Annotated[
+    str | None, typer.Option(help=f"Inference engine: {', '.join(ENGINES)}. The preset's usual one if not given.")
+]
 Preset = Annotated[str, typer.Option(help=f"Model parameters: {', '.join(PRESETS)}, or a .json file of your own.")]
 Policy = Annotated[str, typer.Option(help=f"Policy: {', '.join(POLICIES)}.")]
 Seed = Annotated[int, typer.Option(help="Seed; test number k uses seed + k.")]
@@ -65,6 +70,13 @@ def world_options(
     if urdf is not None:
         given["urdf"] = str(urdf)
     return given
+
+
+def engine_of(engine: str | None, parameters: ModelParameters, usual: str) -> str:
+    """Return the engine that was asked for, or else the usual one, or the one that the parameters need."""
+    if engine is not None:
+        return engine
+    return LearnedStructure.name if parameters.learn_structure else usual
 
 
 def check_at_least(least: int, **numbers: int | None) -> None:

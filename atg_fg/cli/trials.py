@@ -24,13 +24,14 @@ from atg_fg.policies import make_policy
 from atg_fg.presets import preset as preset_named
 from atg_fg.scripted_trial import read_script
 from atg_fg.scripted_trial import replay as replay_script
+from atg_fg.structure.memory import memory_for
 from atg_fg.trial import run_trial
 from atg_fg.worlds import WORLDS, make_world
 
 
 def trial(
     world: options.World = "ideal",
-    engine: options.Engine = "gtsam",
+    engine: options.PresetsEngine = None,
     preset: options.Preset = "default",
     policy: options.Policy = "entropy",
     actions: options.Actions = 10,
@@ -58,8 +59,10 @@ def trial(
     for path in (save_memory, record):
         if path is not None:
             store.check_writable(path)
-    remembered = store.load_memory(memory) if memory else RobotMemory(arcube_assumptions())
-    inference = begin_trial(engine, remembered, preset_named(preset))
+    parameters = preset_named(preset)
+    engine = options.engine_of(engine, parameters, "gtsam")
+    remembered = memory_for(parameters, store.load_memory(memory) if memory else RobotMemory(arcube_assumptions()))
+    inference = begin_trial(engine, remembered, parameters)
     chosen_policy = make_policy(policy)
     cubes = {"cubes": make_arcubes(100, cubes_seed)} if world in WORLDS else {}
     story = Story(options.console(json_file), remembered)

@@ -121,9 +121,7 @@ class StructureLearner:
 
     def same_as(self, other: StructureLearner) -> bool:
         """Return whether both learned the same from the same trials."""
-        known, others = (
-            (each.trials, each.owners, each.candidates, each.rates, each.seed, each.plan) for each in (self, other)
-        )
+        known, others = ((each.trials, each.owners, each.candidates, each.rates, each.seed) for each in (self, other))
         return known == others
 
     @property

@@ -66,6 +66,8 @@ class StructuredMemory(RobotMemory):
     __hash__ = None
 
 
-def empty_memory(assumptions: Assumptions, parameters: ModelParameters) -> RobotMemory:
-    """Return an empty memory that learns what the parameters say is to be learned."""
-    return (StructuredMemory if parameters.learn_structure else RobotMemory)(assumptions)
+def memory_for(parameters: ModelParameters, memory: RobotMemory) -> RobotMemory:
+    """Return a memory with the ATGs of ``memory`` that learns what the parameters say is to be learned."""
+    if parameters.learn_structure and not isinstance(memory, StructuredMemory):
+        return StructuredMemory(memory.assumptions, memory)
+    return memory

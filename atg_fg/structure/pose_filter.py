@@ -25,6 +25,7 @@ NEGLIGIBLE: Final = 1e-9
 UNIMPORTANT: Final = 1e-6
 #: Columns of ``Rows.events``.
 SLIP, WRONG, REPEAT, REVEAL = range(4)
+_ONE_SLIP: Final = np.eye(4)[SLIP]
 
 
 class Rows(NamedTuple):
@@ -35,7 +36,8 @@ class Rows(NamedTuple):
         pose: Shape [R].
         weight: p(pose | owner, what was seen), shape [R].
         table: Index of the row's table of contents, shape [R]; rows that know the same share one.
-        events: Expected slips, wrong looks, repeated symbols and revealed registers so far, shape [R, 4].
+        events: Expected slips, wrong looks, repeated symbols and revealed registers so far, shape [R, 4]; rivals for
+            one trial do without.
     """
 
     owner: IntArray
@@ -94,9 +96,7 @@ class PoseFilter:
         moved = rows._replace(
             pose=self._poses.successors[rows.pose, actions[rows.owner]], weight=rows.weight * (1.0 - slip)
         )
-        slipped = rows.events.copy()
-        slipped[:, SLIP] += 1.0
-        stayed = rows._replace(weight=rows.weight * slip, events=slipped)
+        stayed = rows._replace(weight=rows.weight * slip, events=rows.events + _ONE_SLIP)
         self.rows = Rows(*(np.concatenate(pair) for pair in zip(moved, stayed, strict=True)))
 
     def observe_pattern(self, symbols: IntArray) -> None:
@@ -117,7 +117,8 @@ class PoseFilter:
             before = tables[index, register]
             known &= before[index, seen[:, slot]] > 1.0 - soft.TINY
             tables[index, register] = soft.reveal(before, seen[:, slot], truth)
-            self._count_reveals(before, probabilities[kept, seen[:, slot]], seen[:, slot], truth)
+            if self._log_weights is None:
+                self._count_reveals(before, probabilities[kept, seen[:, slot]], seen[:, slot], truth)
         self._merge(tables, changed=~known & (truth > soft.TINY))
 
     def observe_likelihood(self, likelihood: FloatArray) -> None:
@@ -143,8 +144,8 @@ class PoseFilter:
     def predicted_patterns(self) -> tuple[IntArray, FloatArray]:
         """Return the owners that matter, shape [I], and p(next pattern | action, owner) of each, shape [A, I, |𝒵|]."""
         rows = self.rows.take(np.flatnonzero(self.rows.weight * self._importance()[self.rows.owner] > UNIMPORTANT))
-        first = np.flatnonzero(np.diff(rows.owner, prepend=-1))
-        weights = rows.weight / np.add.reduceat(rows.weight, first)[np.cumsum(np.diff(rows.owner, prepend=-1) > 0) - 1]
+        first, group = _runs(rows.owner)
+        weights = rows.weight / np.add.reduceat(rows.weight, first)[group]
         stayed = self._patterns_of(rows, weights * self._rates.slip, first)
         moved = [
             self._patterns_of(rows._replace(pose=successors), weights * (1.0 - self._rates.slip), first)
@@ -176,7 +177,7 @@ class PoseFilter:
         return events
 
     def _in_view(self, rows: Rows) -> tuple[IntArray, list[FloatArray]]:
-        """Return the register in each slot, shape [R, J], and for each slot the symbols' probabilities, shape [R, S]."""
+        """Return the register in each slot, shape [R, J], and the symbols' probabilities in each, each of shape [R, S]."""
         registers = self._poses.registers[rows.pose, : len(self._alphabet.slots)]
         return registers, [self._shown[rows.table, register] for register in registers.T]
 
@@ -233,8 +234,7 @@ class PoseFilter:
         table[changed] = n_old + np.arange(int(changed.sum()))
         key = rows.owner * len(self._poses.registers) + rows.pose
         order = np.argsort(key, kind="stable")
-        first = np.flatnonzero(np.diff(key[order], prepend=-1))
-        group = np.cumsum(np.diff(key[order], prepend=-1) > 0) - 1
+        first, group = _runs(key[order])
         weight = np.add.reduceat(rows.weight[order], first)
         share = rows.weight[order] / np.maximum(weight, np.finfo(float).tiny)[group]
         events = np.add.reduceat(rows.events[order] * share[:, None], first)
@@ -243,7 +243,7 @@ class PoseFilter:
         new = [tables[changed]]
         if mixed.any():
             members = np.flatnonzero(mixed[group])
-            starts = np.flatnonzero(np.diff(group[members], prepend=-1))
+            starts, _ = _runs(group[members])
             weighted = tables[order[members]] * share[members][:, None, None]
             new.append(np.add.reduceat(weighted, starts))
             lowest[mixed] = n_old + int(changed.sum()) + np.arange(int(mixed.sum()))
@@ -267,3 +267,10 @@ class PoseFilter:
         places = np.ravel_multi_index(tuple(symbols.T), (self._alphabet.n_symbols,) * symbols.shape[1])
         patterns: FloatArray = by_owner[:, places]
         return patterns
+
+
+def _runs(values: IntArray) -> tuple[IntArray, IntArray]:
+    """Return where each run of equal values begins, and for each value the number of its run; at least one value."""
+    begins = np.ones(len(values), dtype=bool)
+    np.not_equal(values[1:], values[:-1], out=begins[1:])
+    return np.flatnonzero(begins), np.cumsum(begins) - 1
