@@ -22,7 +22,7 @@ def test_the_robot_preset_assumes_more_noise_than_none():
 
 
 def test_an_unknown_preset_is_refused_with_the_names_there_are():
-    with pytest.raises(UnknownNameError, match="default, paper, robot"):
+    with pytest.raises(UnknownNameError, match="default, learned, paper, robot"):
         preset("Paper")
 
 

@@ -116,9 +116,8 @@ class PoseFilter:
             register = registers[kept, slot]
             before = tables[index, register]
             known &= before[index, seen[:, slot]] > 1.0 - soft.TINY
-            tables[index, register] = soft.reveal(before, seen[:, slot], truth)
-            if self._log_weights is None:
-                self._count_reveals(before, probabilities[kept, seen[:, slot]], seen[:, slot], truth)
+            tables[index, register], revealed = soft.reveal(before, probabilities[kept], seen[:, slot], truth)
+            self._count_reveals(before, probabilities[kept], revealed)
         self._merge(tables, changed=~known & (truth > soft.TINY))
 
     def observe_likelihood(self, likelihood: FloatArray) -> None:
@@ -138,7 +137,9 @@ class PoseFilter:
         for slot, posterior in enumerate(posteriors):
             register = registers[kept, slot]
             taken = sum((each for other, each in enumerate(posteriors) if other != slot), np.zeros_like(posterior))
-            tables[index, register] = soft.reweigh(tables[index, register], shown[slot][kept], posterior, taken, truth)
+            before, probabilities = tables[index, register], shown[slot][kept]
+            tables[index, register], revealed = soft.reweigh(before, probabilities, posterior, taken, truth)
+            self._count_reveals(before, probabilities, revealed)
         self._merge(tables, changed=truth > soft.TINY)
 
     def predicted_patterns(self) -> tuple[IntArray, FloatArray]:
@@ -177,7 +178,7 @@ class PoseFilter:
         return events
 
     def _in_view(self, rows: Rows) -> tuple[IntArray, list[FloatArray]]:
-        """Return the register in each slot, shape [R, J], and the symbols' probabilities in each, each of shape [R, S]."""
+        """Return the registers in the J slots, shape [R, J], and the symbols' probabilities in each, J × [R, S]."""
         registers = self._poses.registers[rows.pose, : len(self._alphabet.slots)]
         return registers, [self._shown[rows.table, register] for register in registers.T]
 
@@ -212,15 +213,22 @@ class PoseFilter:
         total = log_sum_exp(logarithms)
         return np.exp(logarithms - total) if np.isfinite(total) else np.zeros_like(logarithms)
 
-    def _count_reveals(self, before: FloatArray, shown: FloatArray, symbol: IntArray, truth: FloatArray) -> None:
-        """Count how probably a slot's register was revealed by the look, and its symbol drawn from all symbols."""
-        shown = np.maximum(shown, soft.TINY)
-        known = before[np.arange(len(before)), symbol]
-        revealed = truth * np.maximum(1.0 - known / shown, 0.0)
-        repeated = truth * soft.unrevealed(before[:, None, :])[:, 0]
-        repeated *= self._rates.repeat / self._alphabet.n_symbols / shown
-        self.rows.events[:, REVEAL] += revealed
-        self.rows.events[:, REPEAT] += np.minimum(repeated, revealed)
+    def _count_reveals(self, before: FloatArray, shown: FloatArray, revealed: FloatArray) -> None:
+        """Count how probably a slot's register was revealed by a look, and its symbol drawn from all symbols.
+
+        Rivals for one trial are not counted for.
+
+        Args:
+            before: The register's table, shape [R, S].
+            shown: The probability of each of its symbols, shape [R, S].
+            revealed: The probability that it was revealed and has a symbol, shape [R, S].
+        """
+        if self._log_weights is not None:
+            return
+        from_all = self._rates.repeat / self._alphabet.n_symbols * soft.unrevealed(before[:, None, :])
+        share = np.minimum(from_all / np.maximum(shown - before, soft.TINY), 1.0)
+        self.rows.events[:, REVEAL] += revealed.sum(axis=1)
+        self.rows.events[:, REPEAT] += (revealed * share).sum(axis=1)
 
     def _merge(self, tables: FloatArray, changed: np.ndarray) -> None:
         """Make one row of those with the same owner and pose, and keep each different table once.

@@ -1,0 +1,79 @@
+"""An object that follows a structure, in exact fractions and plain loops, to be read beside ``docs/model.md``.
+
+Nothing is imported from ``atg_fg``. An object's contents are a tuple, the symbol in each register; its registers hold
+different symbols. An arrangement says which register is at each place.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections import defaultdict
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+
+Arrangement = tuple[int, ...]
+Contents = tuple[int, ...]
+Detection = tuple[int | None, ...]
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Each action's sources, and how often things go otherwise."""
+
+    n_slots: int
+    sources: tuple[tuple[int, ...], ...]
+    n_symbols: int
+    slip: Fraction
+    wrong: Fraction
+
+    @property
+    def patterns(self) -> list[tuple[int, ...]]:
+        return list(itertools.permutations(range(self.n_symbols), self.n_slots))
+
+    def arrangements(self) -> list[Arrangement]:
+        """All that the actions lead to."""
+        there = [tuple(range(len(self.sources[0])))]
+        for arrangement in there:
+            there += [turned for turned in self._neighbours(arrangement) if turned not in there]
+        return there
+
+    def _neighbours(self, arrangement: Arrangement) -> Iterable[Arrangement]:
+        return dict.fromkeys(self.turned(arrangement, action) for action in range(len(self.sources)))
+
+    def turned(self, arrangement: Arrangement, action: int) -> Arrangement:
+        return tuple(arrangement[source] for source in self.sources[action])
+
+    def all_contents(self) -> list[Contents]:
+        return list(itertools.permutations(range(self.n_symbols), len(self.sources[0])))
+
+    def probability(self, contents: Contents, looks: Sequence[Detection], actions: Sequence[int]) -> Fraction:
+        """p(looks | actions, contents), the pose at first being any."""
+        everywhere = self.arrangements()
+        belief = {arrangement: Fraction(1, len(everywhere)) for arrangement in everywhere}
+        for time, look in enumerate(looks):
+            if time:
+                moved: defaultdict[Arrangement, Fraction] = defaultdict(Fraction)
+                for arrangement, weight in belief.items():
+                    moved[self.turned(arrangement, actions[time - 1])] += weight * (1 - self.slip)
+                    moved[arrangement] += weight * self.slip
+                belief = moved
+            belief = {
+                arrangement: weight * self.look(contents, arrangement, look) for arrangement, weight in belief.items()
+            }
+        return sum(belief.values(), Fraction(0))
+
+    def look(self, contents: Contents, arrangement: Arrangement, look: Detection) -> Fraction:
+        """p(look | contents, arrangement)."""
+        shown = tuple(contents[register] for register in arrangement[: self.n_slots])
+        anything = sum(agrees(look, pattern) for pattern in self.patterns)
+        return (1 - self.wrong) * agrees(look, shown) + self.wrong * Fraction(anything, len(self.patterns))
+
+    def fresh(self, looks: Sequence[Detection], actions: Sequence[int]) -> Fraction:
+        """p(looks | actions) for an object of which nothing is known."""
+        everything = self.all_contents()
+        return sum((self.probability(each, looks, actions) for each in everything), Fraction(0)) / len(everything)
+
+
+def agrees(look: Detection, pattern: Sequence[int]) -> bool:
+    return all(seen in (None, shown) for seen, shown in zip(look, pattern, strict=True))
