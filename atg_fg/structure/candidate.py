@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 
+from atg_fg.belief import x_log_x
 from atg_fg.patterns import FloatArray, PatternAlphabet
 from atg_fg.structure.likelihood import score_trials
 from atg_fg.structure.rates import Rates, Tally
@@ -81,20 +83,26 @@ class Candidate:
         Args:
             plain: ln p(trial | plain), shape [n].
         """
-        return self._responsibilities(plain)[0]
-
-    def score(self, plain: FloatArray) -> float:
-        """Return ln p(S) + Σ_t ln(π p(trial | S) + (1 − π) p(trial | plain)), with π as these trials have it."""
-        _, share = self._responsibilities(plain)
-        mixed = np.logaddexp(self.log_evidence + np.log(share), plain + np.log1p(-share))
-        return float(mixed.sum()) + self.structure.log_prior
-
-    def _responsibilities(self, plain: FloatArray) -> tuple[FloatArray, float]:
         gain, share = self.log_evidence - plain, 0.5
         for _ in range(_SHARE_ROUNDS):
             following = logistic(gain + np.log(share) - np.log1p(-share))
-            share = float((1.0 + following.sum()) / (2.0 + len(following)))
-        return following, share
+            share = (1.0 + following.sum()) / (2.0 + len(following))
+        return following
+
+    def score(self, plain: FloatArray) -> float:
+        """Return ln p(S) + ln ∫ Π_t (π p(trial | S) + (1 − π) p(trial | plain)) dπ, bounded from below.
+
+        The bound is that of the responsibilities; it is tight where each trial clearly follows the structure or not.
+
+        Args:
+            plain: ln p(trial | plain), shape [n].
+        """
+        following = self.responsibilities(plain)
+        explained = following @ self.log_evidence + (1.0 - following) @ plain
+        doubt = -float((x_log_x(following) + x_log_x(1.0 - following)).sum())
+        n, expected = len(following), float(following.sum())
+        log_shares = math.lgamma(1.0 + expected) + math.lgamma(1.0 + n - expected) - math.lgamma(2.0 + n)
+        return self.structure.log_prior + float(explained) + doubt + log_shares
 
     def tally(self, trials: Sequence[RawTrial], plain: FloatArray) -> Tally:
         """Return the expected numbers of events over all trials, each counted as far as it follows the structure."""

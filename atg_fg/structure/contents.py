@@ -90,8 +90,8 @@ def reweigh(
 ) -> tuple[FloatArray, FloatArray]:
     """Return tables of one register after evidence that did not show its symbol for certain, and what it revealed.
 
-    Both are as those of ``reveal``. The part of the evidence that is the same for all symbols says nothing about an unrevealed register, which stays
-    so; what goes beyond it becomes known.
+    Both are as those of ``reveal``. The part of the evidence that is the same for all symbols says nothing about an
+    unrevealed register, which stays so; what goes beyond it becomes known.
 
     Args:
         known: C of the register before, shape [R, S].

@@ -59,11 +59,18 @@ class StructuredMemory(RobotMemory):
         return StructuredMemory(self.assumptions, (graph.copy() for graph in self), copy.deepcopy(self.learner))
 
     def __eq__(self, other: object) -> bool:
-        if not isinstance(other, StructuredMemory):
+        if not isinstance(other, RobotMemory):
             return NotImplemented
-        return super().__eq__(other) and self.learner.same_as(other.learner)
+        if not isinstance(other, StructuredMemory):
+            return False
+        return super().__eq__(other) is True and self.learner.same_as(other.learner)
 
     __hash__ = None
+
+    def __repr__(self) -> str:
+        return (
+            f"StructuredMemory({len(self)} of {self.assumptions.n_objects} objects, {len(self.learner.trials)} trials)"
+        )
 
 
 def memory_for(parameters: ModelParameters, memory: RobotMemory) -> RobotMemory:

@@ -86,7 +86,7 @@ def test_other_numbers_of_actions_are_refused(text):
         (["--engine", "magic"], "engine: unknown name 'magic'; expected one of: bayes-filter, enumeration, gibbs,"),
         (["--world", "magic"], "world: unknown name 'magic'; expected one of: ideal, rendered"),
         (["--world", "nowhere:some/World-v0"], "world 'nowhere:some/World-v0': cannot be made"),
-        (["--preset", "magic"], "preset: unknown name 'magic'; expected one of: default, paper"),
+        (["--preset", "magic"], "preset: unknown name 'magic'; expected one of: default, learned, paper"),
         (["--policy", "magic"], "policy: unknown name 'magic'; expected one of: entropy, random"),
         (["--actions", "0"], "--actions: 0; expected a whole number of at least 1"),
         (["--tests", "-1"], "--tests: -1; expected a whole number of at least 1"),

@@ -11,6 +11,7 @@ from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import cached_property
 
 Arrangement = tuple[int, ...]
 Contents = tuple[int, ...]
@@ -27,10 +28,11 @@ class Structure:
     slip: Fraction
     wrong: Fraction
 
-    @property
+    @cached_property
     def patterns(self) -> list[tuple[int, ...]]:
         return list(itertools.permutations(range(self.n_symbols), self.n_slots))
 
+    @cached_property
     def arrangements(self) -> list[Arrangement]:
         """All that the actions lead to."""
         there = [tuple(range(len(self.sources[0])))]
@@ -49,7 +51,7 @@ class Structure:
 
     def probability(self, contents: Contents, looks: Sequence[Detection], actions: Sequence[int]) -> Fraction:
         """p(looks | actions, contents), the pose at first being any."""
-        everywhere = self.arrangements()
+        everywhere = self.arrangements
         belief = {arrangement: Fraction(1, len(everywhere)) for arrangement in everywhere}
         for time, look in enumerate(looks):
             if time:
@@ -66,6 +68,8 @@ class Structure:
     def look(self, contents: Contents, arrangement: Arrangement, look: Detection) -> Fraction:
         """p(look | contents, arrangement)."""
         shown = tuple(contents[register] for register in arrangement[: self.n_slots])
+        if not agrees(look, shown) and None not in look:
+            return self.wrong / len(self.patterns)
         anything = sum(agrees(look, pattern) for pattern in self.patterns)
         return (1 - self.wrong) * agrees(look, shown) + self.wrong * Fraction(anything, len(self.patterns))
 

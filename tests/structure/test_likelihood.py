@@ -20,7 +20,7 @@ ROTATION = SharedStructure(2, ((1, 2, 3, 0),))
 
 
 def oracle_of(structure, n_symbols, rates):
-    slip, wrong = Fraction(rates.slip), Fraction(rates.wrong)
+    slip, wrong = (Fraction(str(rate)) for rate in (rates.slip, rates.wrong))
     return oracle.Structure(structure.n_slots, structure.sources, n_symbols, slip, wrong)
 
 

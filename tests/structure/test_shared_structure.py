@@ -94,7 +94,7 @@ def test_json_and_back_changes_nothing():
         ({"sources": {}}, "here.sources: key 'flip' is missing"),
         (
             {"sources": {"flip": [0, 1], "left": [1, 0], "right": [1, 1]}},
-            r"here.sources.right: \[1, 1\]; expected a per",
+            r"here.sources.right: \[1, 1\]; expected a",
         ),
         ({"sources": {"flip": [0, 1], "left": [1, 0], "right": 3}}, "here.sources.right: 3; expected a list"),
         ({"more": 1}, "here: unknown key 'more'"),
