@@ -17,7 +17,7 @@ from atg_fg.all_different import identity_given_others
 from atg_fg.arcube import ORIENTATIONS, make_arcubes, shown_pattern
 from atg_fg.assumptions import arcube_assumptions
 from atg_fg.belief import IdentityBelief
-from atg_fg.engines import ENGINES, begin_trial
+from atg_fg.engines import begin_trial, check_engine
 from atg_fg.errors import InvalidInputError, unknown_name
 from atg_fg.goal_records import GoalRunFile
 from atg_fg.goal_scoring import ServedObject, score
@@ -82,8 +82,8 @@ class GoalPlan:
                 raise InvalidInputError(
                     f"{name}: {getattr(self, name)}; expected at most {larger} = {getattr(self, larger)}"
                 )
+        check_engine(self.engine, self.parameters)
         for role, name, known in (
-            ("engine", self.engine, ENGINES),
             ("planner", self.planner, PLANNERS),
             ("policy", self.learning_policy, POLICIES),
             ("unreachable", self.unreachable, UNREACHABLE),
@@ -120,7 +120,9 @@ def run_goals(
     else:
         policy = make_policy(plan.learning_policy)
         rng = np.random.default_rng(learning_seed)
-        memory = learned_memory(assumptions, cubes, policy, plan.learning_actions, rng, plan.learning_world)
+        memory = learned_memory(
+            assumptions, cubes, policy, plan.learning_actions, rng, plan.learning_world, plan.parameters
+        )
     setup = np.random.default_rng(setup_seed)
     objects = setup.permutation(len(cubes))[: plan.n_stations].tolist()
     served, records = [], []

@@ -1,7 +1,7 @@
 """Paths to a goal over what is known of one object: reachable aspects, shortest paths, and what is not yet tried.
 
-Every function takes a *transition graph*: a networkx multigraph with an aspect's ``pattern`` (index) on each node and,
-on each edge, keyed by its ``action``, the ``probability`` that the action leads there.
+Every function takes a *transition graph*: a networkx multigraph with an aspect's ``pattern`` (index, or ``None`` if not
+known) on each node and, on each edge, keyed by its ``action``, the ``probability`` that the action leads there.
 """
 
 from __future__ import annotations
@@ -93,7 +93,8 @@ def transitions_of_hypothesis(model: RecognitionModel, hypothesis: int) -> Trans
 
 def goal_aspects(graph: TransitionGraph, goal: Goal) -> list[int]:
     """Return the known aspects that show the goal."""
-    return [aspect for aspect in graph if goal.patterns[graph.nodes[aspect]["pattern"]]]
+    patterns = ((aspect, graph.nodes[aspect]["pattern"]) for aspect in graph)
+    return [aspect for aspect, pattern in patterns if pattern is not None and goal.patterns[pattern]]
 
 
 def reachable_aspects(graph: TransitionGraph, source: int) -> set[int]:
@@ -122,7 +123,8 @@ def nearest_aspect(graph: TransitionGraph, source: int, goal: Goal, cost: str = 
     """Return the path to the reachable aspect that is most like the goal; of several, the one of least cost."""
 
     def rank(path: GoalPath) -> tuple[int, float, tuple[int, ...]]:
-        return -goal.likeness(graph.nodes[path.aspects[-1]]["pattern"]), path.cost, path.aspects
+        pattern = graph.nodes[path.aspects[-1]]["pattern"]
+        return -goal.likeness(pattern) if pattern is not None else 0, path.cost, path.aspects
 
     return min(_cheapest_paths(graph, source, cost).values(), key=rank)
 
@@ -146,14 +148,16 @@ def action_costs(graph: TransitionGraph, targets: Collection[int], n_actions: in
 def exploration_costs(graph: TransitionGraph, n_actions: int, cost: str) -> dict[int, FloatArray]:
     """Return, for each aspect, what it costs to try something new by each first action, shape [A].
 
-    New is an action that was never tried from an aspect; it counts as one that succeeds.
+    New is an action that was never tried from an aspect; it counts as one that succeeds. So is an aspect whose pattern
+    is not known.
     """
     extended = graph.copy()
     for aspect in graph:
         tried = {action for _, _, action in graph.out_edges(aspect, keys=True)}
         for action in set(range(n_actions)) - tried:
             extended.add_edge(aspect, _UNTRIED, key=action, action=action, probability=1.0)
-    targets = [_UNTRIED] if _UNTRIED in extended else []
+    targets = [aspect for aspect in graph if graph.nodes[aspect]["pattern"] is None]
+    targets += [_UNTRIED] if _UNTRIED in extended else []
     costs = action_costs(extended, targets, n_actions, cost)
     costs.pop(_UNTRIED, None)
     return costs

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from contextlib import closing
+from typing import Final
 
 import numpy as np
 
@@ -14,8 +15,11 @@ from atg_fg.graph import AspectTransitionGraph
 from atg_fg.memory import RobotMemory
 from atg_fg.parameters import ModelParameters
 from atg_fg.policies import Policy
+from atg_fg.structure.memory import memory_for
 from atg_fg.trial import run_trial
 from atg_fg.worlds import make_world
+
+_PLAIN: Final = ModelParameters()
 
 
 def learned_memory(
@@ -25,6 +29,7 @@ def learned_memory(
     n_actions: int,
     rng: np.random.Generator,
     world: str = "ideal",
+    parameters: ModelParameters = _PLAIN,
 ) -> RobotMemory:
     """Return a memory of all cubes, in their order, each turned over in one trial.
 
@@ -37,14 +42,16 @@ def learned_memory(
         n_actions: On each cube.
         rng: Of all these trials.
         world: Name of the world.
+        parameters: Say whether the memory learns what the cubes share.
     """
-    memory = RobotMemory(assumptions)
+    memory = memory_for(parameters, RobotMemory(assumptions))
     with closing(make_world(world, cubes=cubes)) as made_world:
         for number in range(len(cubes)):
             # An empty memory, since what else is remembered is of no interest while a new object is explored.
-            inference = begin_trial("bayes-filter", RobotMemory(assumptions), ModelParameters())
+            inference = begin_trial("bayes-filter", RobotMemory(assumptions), _PLAIN)
             record = run_trial(made_world, inference, policy, n_actions, rng, reset_options={"object": number})
-            memory.learn(record.patterns, record.actions, matched=None)
+            name = memory.learn(record.patterns, record.actions, matched=None)
+            memory.learn_shared(name, record.detections, record.actions)
     return memory
 
 

@@ -26,7 +26,7 @@ class Situation(NamedTuple):
         hypothesis: State of O.
         probability: p(hypothesis | z_0:t, a_1:t), or a part of it where there is more than one way to be that object.
         graph: The transitions that are known of it.
-        belief: p(aspect | hypothesis, z_0:t, a_1:t) of each node; what is lacking to one is nowhere in the graph.
+        belief: p(aspect | hypothesis, z_0:t, a_1:t) of nodes; what is lacking to one is nowhere in the graph.
     """
 
     hypothesis: int

@@ -25,7 +25,7 @@ RENDER_MODES: Final = {"rendered": "detections", "robonaut": "rgb_array_list"}
 
 def goal(
     world: options.World = "ideal",
-    engine: options.Engine = "gtsam",
+    engine: options.PresetsEngine = None,
     preset: options.Preset = "default",
     cubes: Annotated[int, typer.Option(help="Cubes before the robot, each at a station.")] = 3,
     memory_cubes: Annotated[int, typer.Option(help="Cubes that the memory is learned from, these among them.")] = 20,
@@ -70,12 +70,14 @@ def goal(
         if world not in RENDER_MODES:
             raise unknown_name("--video: world with a camera", world, RENDER_MODES)
         figures.check_film_path(video)
+    model = preset_named(preset)
+    engine = options.engine_of(engine, model, "gtsam")
     world_options = options.world_options(slip, wrong, missing, condition, urdf)
     plan = GoalPlan(
         world=world,
         world_options=world_options,
         engine=engine,
-        parameters=preset_named(preset),
+        parameters=model,
         planner=planner,
         unreachable=unreachable,
         settled=settled,

@@ -76,8 +76,7 @@ class Inference(ABC):
         Raises:
             InvalidInputError: Asked before a look or between an action and its look.
         """
-        if self.history.awaits_evidence:
-            raise InvalidInputError("expected entropy: asked before the look; expected an observation first")
+        self._check_looked("expected entropy")
         return self._expected_entropies()
 
     def situations(self) -> list[Situation]:
@@ -90,14 +89,18 @@ class Inference(ABC):
         Raises:
             InvalidInputError: Asked before a look or between an action and its look.
         """
-        if self.history.awaits_evidence:
-            raise InvalidInputError("shown patterns: asked before the look; expected an observation first")
+        self._check_looked("shown patterns")
         return shown_patterns_of(self.model, self.aspect_belief, self.history.evidence[-1])
 
     def chain(self, hypothesis: int | None = None) -> Chain:
         """Return the trial so far as plain arrays, for all hypotheses or under one of them."""
         hypotheses = None if hypothesis is None else [hypothesis]
         return build_chain(self.memory, self.parameters, self.history, hypotheses, self.prior)
+
+    def _check_looked(self, asked: str) -> None:
+        """Raise ``InvalidInputError`` if what is asked for makes no sense before the next look."""
+        if self.history.awaits_evidence:
+            raise InvalidInputError(f"{asked}: asked before the look; expected an observation first")
 
     def _impossible(self) -> ImpossibleEvidenceError:
         """Return the error for a look, the one about to be taken in, that no hypothesis allows."""

@@ -11,13 +11,15 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from atg_fg.belief import IdentityBelief, log_sum_exp
+from atg_fg.belief import IdentityBelief, log_of, log_sum_exp
 from atg_fg.engines.bayes_filter import BayesFilter, forward_backward
 from atg_fg.expected_entropy import expected_entropies_of_table, next_pattern_joint, pattern_table
 from atg_fg.memory import RobotMemory
 from atg_fg.model import COLLECTION
 from atg_fg.parameters import ModelParameters
 from atg_fg.patterns import Evidence, FloatArray
+from atg_fg.situations import LEAST_PROBABILITY, Situation, shown_patterns_of, situations_of
+from atg_fg.structure.completion import pose_graph
 from atg_fg.structure.learner import BelievedStructure
 from atg_fg.structure.memory import StructuredMemory
 from atg_fg.structure.pose_chain import pose_chain, pose_patterns
@@ -39,19 +41,17 @@ class LearnedStructure(BayesFilter):
     exact: ClassVar[bool] = False
     knows_structure: ClassVar[bool] = True
 
-    def __init__(self, memory: RobotMemory, parameters: ModelParameters) -> None:
-        super().__init__(memory, parameters)
+    def __init__(self, memory: RobotMemory, parameters: ModelParameters, prior: IdentityBelief | None = None) -> None:
+        super().__init__(memory, parameters, prior)
         believed: list[BelievedStructure] = []
         rates = Rates()
         if parameters.learn_structure and isinstance(memory, StructuredMemory):
             believed, rates = memory.learner.believed(memory.names), memory.learner.rates
-        self._log_prior = np.log(self.model.prior)
         followers = [each.weight * np.append(each.followers, rates.share) for each in believed]
-        with np.errstate(divide="ignore"):  # −∞ for what an object cannot be
-            self._log_plain = self._log_prior + np.log(1.0 - sum(followers, np.zeros(self.model.n_hypotheses)))
-            log_weights = [self._log_prior + np.log(each) for each in followers]
+        self._log_plain = log_of(1.0 - sum(followers, np.zeros(self.model.n_hypotheses)))
         self._followed = [
-            FollowedStructure(each, weights, rates, memory) for each, weights in zip(believed, log_weights, strict=True)
+            FollowedStructure(each, log_of(self.model.prior * follow), rates, memory)
+            for each, follow in zip(believed, followers, strict=True)
         ]
 
     def observe(self, evidence: Evidence) -> None:
@@ -94,7 +94,7 @@ class LearnedStructure(BayesFilter):
 
     def _log_joints(self) -> list[FloatArray]:
         """Return ln p(O, type, z_0:t | a_1:t) of being plain, then of following each structure, each of shape [H]."""
-        plain = self._log_plain + self._belief.log_identity + self._log_evidence - self._log_prior
+        plain = self._log_plain + self._belief.log_identity + self._log_evidence
         return [plain, *(each.log_joint for each in self._followed)]
 
     def _type_beliefs(self) -> list[FloatArray]:
@@ -102,6 +102,44 @@ class LearnedStructure(BayesFilter):
         joints = self._log_joints()
         total = log_sum_exp(np.concatenate(joints))
         return [np.exp(joint - total) for joint in joints]
+
+    @property
+    def aspect_belief(self) -> FloatArray:
+        """p(O, X_t | z_0:t, a_1:t), shape [H, W]; a pose counts as the aspect that shows what it shows."""
+        if not self._followed:
+            return super().aspect_belief
+        beliefs = self._type_beliefs()
+        joint = beliefs[0][:, None] * self._belief.aspects
+        for each, belief in zip(self._followed, beliefs[1:], strict=True):
+            owners, patterns = each.filter.shown_patterns()
+            rows = np.repeat(owners, patterns.shape[1])
+            np.add.at(joint, (rows, self.model.aspect_of[owners].ravel()), (belief[owners, None] * patterns).ravel())
+        return joint
+
+    def situations(self) -> list[Situation]:
+        """Return what the object may be, a plain ATG or a follower of a structure, and where in it the robot is."""
+        beliefs = self._type_beliefs()
+        situations = situations_of(self.model, beliefs[0][:, None] * self._belief.aspects)
+        for each, belief in zip(self._followed, beliefs[1:], strict=True):
+            situations += each.situations(belief)
+        return situations
+
+    def shown_patterns(self) -> FloatArray:
+        """Return the probability of each pattern to be the one shown now, given all evidence, shape [|𝒵|].
+
+        Raises:
+            InvalidInputError: Asked before a look or between an action and its look.
+        """
+        if not self._followed:
+            return super().shown_patterns()
+        self._check_looked("shown patterns")
+        beliefs = self._type_beliefs()
+        plain = beliefs[0][:, None] * self._belief.aspects
+        shown = shown_patterns_of(self.model, plain, self.history.evidence[-1])
+        for each, belief in zip(self._followed, beliefs[1:], strict=True):
+            owners, patterns = each.filter.shown_patterns()
+            shown += belief[owners] @ patterns
+        return shown
 
     def _expected_entropies(self) -> FloatArray:
         """Return eq. 3 for each action, shape [A], from p(O, z | a) summed over types, poses and contents."""
@@ -165,6 +203,21 @@ class FollowedStructure:
     def log_joint(self) -> FloatArray:
         """Ln p(O, the object follows this structure, z_0:t | a_1:t), shape [H]."""
         return self._log_weights + self.filter.log_evidence
+
+    def situations(self, belief: FloatArray) -> list[Situation]:
+        """Return a situation for each probable object, with its poses as aspects.
+
+        Args:
+            belief: p(O, the object follows this structure | z_0:t, a_1:t), shape [H].
+        """
+        situations = []
+        for hypothesis in np.flatnonzero(belief >= LEAST_PROBABILITY).tolist():
+            contents = self.filter.learned_contents(hypothesis)
+            if contents is not None:
+                graph = pose_graph(self._poses, contents, self._rates, self._alphabet)
+                poses = self.filter.poses_of(hypothesis)
+                situations.append(Situation(hypothesis, float(belief[hypothesis]), graph, poses))
+        return situations
 
     def observe(self, evidence: Evidence) -> None:
         """Take in the evidence of a look."""

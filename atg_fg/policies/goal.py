@@ -11,7 +11,7 @@ from atg_fg.engines.base import Inference
 from atg_fg.errors import InvalidInputError, unknown_name
 from atg_fg.goal_planning import COSTS, action_costs, goal_aspects
 from atg_fg.goals import Goal
-from atg_fg.policies.base import Choice, Policy
+from atg_fg.policies.base import Choice
 from atg_fg.policies.exploration import outlooks_on_the_new
 from atg_fg.policies.outlook import Outlook, best_by_expectation, share_with_a_path
 from atg_fg.policies.recognition import EntropyPolicy
@@ -23,6 +23,9 @@ UNREACHABLE: Final = ("declare", "explore")
 
 #: Entropy of O below which an object is recognised, nats: then, if the belief is right, about one in 750 is another.
 SETTLED: Final = 0.01
+
+#: Where no action is expected to lower the entropy of identity by this much, nats, there is nothing to recognise by.
+LEAST_GAIN: Final = 1e-4
 
 #: Returns the costs of reaching a goal by each first action, in each situation.
 Planner: TypeAlias = Callable[[Inference, Goal], list[Outlook]]
@@ -115,14 +118,16 @@ class GoalPolicy:
         self.settled = settled
         self.confidence = confidence
         self._planner = PLANNERS[planner]()
-        self._recognition: Policy = EntropyPolicy()
+        self._recognition = EntropyPolicy()
 
     def choose(self, inference: Inference, rng: np.random.Generator) -> Choice:
         """Return the next action, or none with purpose ``reached`` or ``unreachable``."""
         if self.is_reached(inference):
             return Choice(None, None, "reached")
         if inference.identity().entropy_of_verdict > self.settled:
-            return self._recognition.choose(inference, rng)._replace(purpose="recognise")
+            informative = self._recognition.choose(inference, rng)
+            if expected_gain(inference, informative) > LEAST_GAIN:
+                return informative._replace(purpose="recognise")
         n_actions = inference.model.n_actions
         outlooks = self._planner(inference, self.goal)
         if share_with_a_path(outlooks) > 0.5:
@@ -134,3 +139,10 @@ class GoalPolicy:
     def is_reached(self, inference: Inference) -> bool:
         """Whether the goal is shown now, with the confidence asked for."""
         return float(inference.shown_patterns()[self.goal.patterns].sum()) >= self.confidence
+
+
+def expected_gain(inference: Inference, choice: Choice) -> float:
+    """Return by how many nats the most informative action is expected to lower the entropy of identity."""
+    if choice.expected_entropies is None:
+        return np.inf
+    return float(inference.identity().entropy - choice.expected_entropies.min())

@@ -20,7 +20,7 @@ class Outlook(NamedTuple):
 
     Attributes:
         probability: Of the situation.
-        belief: Probability of each aspect in it.
+        belief: Probability of each aspect in it; improbable ones may be left out.
         costs: Of each first action from each aspect, shape [A]; ∞ where no known path leads on.
     """
 
@@ -36,7 +36,7 @@ class Outlook(NamedTuple):
     @property
     def share_with_a_path(self) -> float:
         """Probability to be at an aspect from which some action leads on."""
-        return sum(self.belief[aspect] for aspect, costs in self.costs.items() if np.isfinite(costs).any())
+        return sum(each for aspect, each in self.belief.items() if np.isfinite(self.costs[aspect]).any())
 
 
 def share_with_a_path(outlooks: Sequence[Outlook]) -> float:
@@ -50,6 +50,6 @@ def best_by_expectation(outlooks: Sequence[Outlook], n_actions: int, rng: np.ran
     """Return an action of least expected cost; ties are broken at random."""
     expected = np.zeros(n_actions)
     for outlook in outlooks:
-        for aspect, costs in outlook.costs.items():
-            expected += outlook.probability * outlook.belief[aspect] * np.minimum(costs, NO_PATH_COST)
+        for aspect, probability in outlook.belief.items():
+            expected += outlook.probability * probability * np.minimum(outlook.costs[aspect], NO_PATH_COST)
     return one_of_the_best(expected, rng)

@@ -155,6 +155,19 @@ class PoseFilter:
         noise = self._rates.wrong / len(self._alphabet)
         return rows.owner[first], (1.0 - self._rates.wrong) * (np.array(moved) + stayed) + noise
 
+    def shown_patterns(self) -> tuple[IntArray, FloatArray]:
+        """Return the owners that matter, shape [I], and p(pattern shown now | owner) of each, shape [I, |𝒵|]."""
+        rows = self.rows.take(np.flatnonzero(self.rows.weight * self._importance()[self.rows.owner] > UNIMPORTANT))
+        first, group = _runs(rows.owner)
+        weights = rows.weight / np.add.reduceat(rows.weight, first)[group]
+        return rows.owner[first], self._patterns_of(rows, weights, first)
+
+    def poses_of(self, owner: int) -> dict[int, float]:
+        """Return the probability of each pose of an owner that is not negligible."""
+        own = np.flatnonzero(self.rows.owner == owner)
+        weight = self.rows.weight[own]
+        return dict(zip(self.rows.pose[own].tolist(), (weight / weight.sum()).tolist(), strict=True))
+
     def learned_contents(self, owner: int) -> FloatArray | None:
         """Return the table of an owner's most probable pose if it is at least even, else their mean, shape [P, S].
 
