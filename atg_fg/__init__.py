@@ -12,6 +12,9 @@ from atg_fg.goals import Goal
 from atg_fg.graph import AspectTransitionGraph
 from atg_fg.joint_recognition import JointRecognitionGraph
 from atg_fg.memory import RobotMemory
+from atg_fg.object_families import FAMILIES
+from atg_fg.object_worlds import ObjectWorld
+from atg_fg.objects import FiniteObject, Mechanism, ObjectFamily
 from atg_fg.parameters import ModelParameters
 from atg_fg.patterns import Evidence, PatternAlphabet
 from atg_fg.policies import POLICIES, GoalPolicy, make_policy
@@ -19,12 +22,13 @@ from atg_fg.presets import PRESETS, preset
 from atg_fg.recognition import RecognitionGraph
 from atg_fg.store import load_memory, save_memory
 from atg_fg.trial import TrialRecord, run_trial
-from atg_fg.worlds import WORLDS, make_world
+from atg_fg.worlds import WORLDS, assumptions_of, make_world
 
 __version__ = "0.1.0"
 
 __all__ = [
     "ENGINES",
+    "FAMILIES",
     "POLICIES",
     "PRESETS",
     "WORLDS",
@@ -32,12 +36,16 @@ __all__ = [
     "Assumptions",
     "AtgError",
     "Evidence",
+    "FiniteObject",
     "Goal",
     "GoalPolicy",
     "IdentityBelief",
     "Inference",
     "JointRecognitionGraph",
+    "Mechanism",
     "ModelParameters",
+    "ObjectFamily",
+    "ObjectWorld",
     "PatternAlphabet",
     "RecognitionGraph",
     "RobotMemory",
@@ -45,6 +53,7 @@ __all__ = [
     "TestResult",
     "TrialRecord",
     "arcube_assumptions",
+    "assumptions_of",
     "begin_trial",
     "different_identities",
     "identity_given_others",

@@ -13,8 +13,6 @@ from typing import Any
 
 import numpy as np
 
-from atg_fg.arcube import make_arcubes
-from atg_fg.assumptions import arcube_assumptions
 from atg_fg.engines import begin_trial, check_engine
 from atg_fg.engines.base import Inference
 from atg_fg.errors import InvalidInputError
@@ -27,7 +25,7 @@ from atg_fg.store import make_folder
 from atg_fg.structure.memory import memory_for
 from atg_fg.trial import TrialRecord, run_trial
 from atg_fg.trial_log import TrialLog, TrialOutcome
-from atg_fg.worlds import WORLDS, World, make_world
+from atg_fg.worlds import World, assumptions_of, make_world_with
 
 
 @dataclass(frozen=True)
@@ -44,7 +42,7 @@ class TestPlan:
             rather than those that were seen whole.
         n_actions: Actions a trial.
         n_trials: Trials a test.
-        n_objects: |O|.
+        n_objects: |O|, unless a user's own world says another in its assumptions.
     """
 
     __test__ = False  # the paper calls it a test; pytest should not collect it
@@ -66,10 +64,9 @@ class TestPlan:
         check_engine(self.engine, self.parameters)
         make_policy(self.policy)
 
-    def make_world(self, cubes_seed: int) -> World:
-        """Return this plan's world, with cubes of its own if it is one of the ARcube worlds."""
-        cubes = {"cubes": make_arcubes(self.n_objects, cubes_seed)} if self.world in WORLDS else {}
-        return make_world(self.world, **cubes, **self.world_options)
+    def make_world(self, objects_seed: int) -> World:
+        """Return this plan's world, with objects drawn by ``objects_seed`` unless it is a user's own."""
+        return make_world_with(self.world, self.n_objects, objects_seed, **self.world_options)
 
 
 @dataclass(frozen=True)
@@ -105,7 +102,7 @@ def run_test(
 ) -> TestResult:
     """Run a test from an empty memory and score it.
 
-    Each trial has one generator, spawned from ``SeedSequence(seed)``; the first child draws the cubes.
+    Each trial has one generator, spawned from ``SeedSequence(seed)``; the first child draws the objects.
 
     Args:
         plan: World, engine, policy and sizes.
@@ -117,15 +114,15 @@ def run_test(
     Raises:
         InvalidInputError: The records are of another test, or already there while ``resume`` is false.
     """
-    cubes_seed, *trial_seeds = np.random.SeedSequence(seed).spawn(1 + plan.n_trials)
-    memory = memory_for(plan.parameters, RobotMemory(arcube_assumptions(plan.n_objects)))
-    log = _open_log(plan, seed, records, memory)
-    score = _Score()
-    if log is not None:
-        for outcome in log.resume() if resume else log.begin():
-            score.add(outcome, learn_from(outcome, memory))
+    objects_seed, *trial_seeds = np.random.SeedSequence(seed).spawn(1 + plan.n_trials)
     policy = make_policy(plan.policy)
-    with closing(plan.make_world(int(cubes_seed.generate_state(1)[0]))) as world:
+    score = _Score()
+    with closing(plan.make_world(int(objects_seed.generate_state(1)[0]))) as world:
+        memory = memory_for(plan.parameters, RobotMemory(assumptions_of(world, plan.n_objects)))
+        log = _open_log(plan, seed, records, memory)
+        if log is not None:
+            for outcome in log.resume() if resume else log.begin():
+                score.add(outcome, learn_from(outcome, memory))
         for number in range(score.n_trials, plan.n_trials):
             inference = begin_trial(plan.engine, memory, plan.parameters)
             rng = np.random.default_rng(trial_seeds[number])

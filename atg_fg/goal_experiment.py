@@ -29,7 +29,7 @@ from atg_fg.policies.goal import PLANNERS, SETTLED, UNREACHABLE
 from atg_fg.stations import AtStation, make_stations
 from atg_fg.store import make_folder
 from atg_fg.trial import TrialRecord, run_trial
-from atg_fg.worlds import World
+from atg_fg.worlds import World, check_arcube_world
 
 #: As ``learning_actions``: the memory knows all that there is to know.
 COMPLETE: Final = 0
@@ -90,6 +90,8 @@ class GoalPlan:
         ):
             if name not in known:
                 raise unknown_name(role, name, known)
+        check_arcube_world("world", self.world)
+        check_arcube_world("learning_world", self.learning_world)
 
 
 @dataclass(frozen=True, eq=False)

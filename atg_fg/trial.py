@@ -16,7 +16,7 @@ from atg_fg.errors import InvalidInputError
 from atg_fg.json_format import plain_json
 from atg_fg.patterns import Detection, Evidence, FloatArray
 from atg_fg.policies import Policy
-from atg_fg.worlds import World, detection_of
+from atg_fg.worlds import World, assumptions_of, detection_of
 
 #: How a trial can end.
 Verdict: TypeAlias = Literal["novel", "known", "lost", "undecided"]
@@ -129,7 +129,7 @@ class TrialRecord:
 
 
 def check_world(world: World, assumptions: Assumptions) -> None:
-    """Raise ``InvalidInputError`` if a world's spaces do not fit the assumptions."""
+    """Raise ``InvalidInputError`` if a world's spaces, or the assumptions it states, do not fit the assumptions."""
     expected = (
         len(assumptions.actions),
         [assumptions.alphabet.n_symbols + 1] * len(assumptions.alphabet.slots),
@@ -140,6 +140,13 @@ def check_world(world: World, assumptions: Assumptions) -> None:
             f"world: {world.action_space} and {world.observation_space}; expected {expected[0]} actions and "
             f"{expected[1]} symbols, counting 'missing', in the slots"
         )
+    stated = assumptions_of(world, assumptions.n_objects) if world.has_wrapper_attr("assumptions") else assumptions
+    for place, ours, theirs in (
+        ("actions", assumptions.actions, stated.actions),
+        ("slots", assumptions.alphabet.slots, stated.alphabet.slots),
+    ):
+        if ours != theirs:
+            raise InvalidInputError(f"world: {place} {', '.join(theirs)}; expected those remembered: {', '.join(ours)}")
 
 
 def run_trial(

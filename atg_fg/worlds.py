@@ -1,4 +1,4 @@
-"""Worlds as gymnasium environments: the ideal ARcube, and the registry of world names.
+"""Worlds as gymnasium environments: one object in finitely many states, the ideal ARcube, the registry of names.
 
 A world has a ``Discrete`` action space and a ``MultiDiscrete`` observation space with one entry a slot:
 the symbol detected there, or ``MISSING``. ``info`` carries the truth, for scoring only.
@@ -6,14 +6,16 @@ the symbol detected there, or ``MISSING``. ``info`` carries the truth, for scori
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import Any, Final, TypeAlias
+from typing import Any, ClassVar, Final, TypeAlias
 
 import gymnasium
 import numpy as np
 from gymnasium import spaces
 
 from atg_fg.arcube import ACTION_SOURCES, FACES, N_TAGS, ORIENTATIONS, SUCCESSORS, Cube, make_arcubes, shown_pattern
+from atg_fg.assumptions import Assumptions, arcube_assumptions
 from atg_fg.errors import InvalidInputError, unknown_name
 from atg_fg.patterns import Detection, IntArray
 
@@ -27,7 +29,15 @@ WORLDS: Final[dict[str, str]] = {
     "ideal": "atg_fg:atg_fg/ARcube-v0",
     "rendered": "sim:sim/RenderedARcube-v0",
     "robonaut": "sim:sim/RobonautARcube-v0",
+    "prism": "atg_fg:atg_fg/HexagonalPrism-v0",
+    "lock": "atg_fg:atg_fg/RingLock-v0",
+    "lid-box": "atg_fg:atg_fg/LidBox-v0",
+    "random-atg": "atg_fg:atg_fg/RandomATG-v0",
+    "half-and-half": "atg_fg:atg_fg/HalfAndHalf-v0",
+    "repeated-tags": "atg_fg:atg_fg/RepeatedTags-v0",
 }
+#: Those of them whose objects are ARcubes, given as ``cubes``. The others draw objects of their own.
+ARCUBE_WORLDS: Final = ("ideal", "rendered", "robonaut")
 
 
 def make_world(name: str, **options: Any) -> World:
@@ -47,6 +57,41 @@ def make_world(name: str, **options: Any) -> World:
         raise InvalidInputError(f"world {name!r}: cannot be made: {error}") from error
 
 
+def make_world_with(name: str, n_objects: int, seed: int, **options: Any) -> World:
+    """Return the world registered as ``name`` with ``n_objects`` objects drawn by ``seed``; a user's own has its own.
+
+    Raises:
+        InvalidInputError: As for ``make_world``.
+    """
+    if name in ARCUBE_WORLDS:
+        return make_world(name, cubes=make_arcubes(n_objects, seed), **options)
+    if name in WORLDS:
+        return make_world(name, n_objects=n_objects, objects_seed=seed, **options)
+    return make_world(name, **options)
+
+
+def assumptions_of(world: World, n_objects: int) -> Assumptions:
+    """Return what the robot shall take for granted in a world: what its attribute ``assumptions`` says, if it has one.
+
+    A world without one is of ``n_objects`` ARcubes.
+
+    Raises:
+        InvalidInputError: The attribute is something else.
+    """
+    if not world.has_wrapper_attr("assumptions"):
+        return arcube_assumptions(n_objects)
+    found = world.get_wrapper_attr("assumptions")
+    if not isinstance(found, Assumptions):
+        raise InvalidInputError(f"world's assumptions: {found!r}; expected an atg_fg.Assumptions")
+    return found
+
+
+def check_arcube_world(role: str, name: str) -> None:
+    """Raise ``InvalidInputError`` naming ``role`` if the world of this name is known to be without ARcubes."""
+    if name in WORLDS and name not in ARCUBE_WORLDS:
+        raise InvalidInputError(f"{role}: {name!r}; expected a world of ARcubes: {', '.join(ARCUBE_WORLDS)}")
+
+
 def detection_of(observation: IntArray) -> Detection:
     """Return an observation as a detection, with ``None`` for each missing symbol."""
     return tuple(None if symbol == MISSING else int(symbol) for symbol in observation)
@@ -59,7 +104,123 @@ def probability_option(name: str, value: float) -> float:
     return float(value)
 
 
-class ARcubeWorld(gymnasium.Env[IntArray, np.int64]):
+class FiniteStateWorld(gymnasium.Env[IntArray, np.int64], ABC):
+    """One object in one of finitely many states: actions change it, and looks at it may fail.
+
+    A subclass says which objects there are, where actions lead and what a state shows.
+
+    Args:
+        n_objects: Objects of this world.
+        n_actions: Actions.
+        n_slots: Slots of a pattern.
+        n_symbols: Symbols that a slot can show.
+        slip: Probability that an action fails and the object stays as it is.
+        wrong: Probability that a look shows a pattern drawn uniformly from all patterns instead.
+        missing: Probability, for each slot alone, that its symbol is not detected.
+
+    ``reset(options={"object": i, "state": j})`` sets what is not to be drawn at random.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - gymnasium declares it so
+    #: What a state is called in reset options and in ``info``.
+    state_name: ClassVar[str] = "state"
+
+    def __init__(
+        self,
+        n_objects: int,
+        n_actions: int,
+        n_slots: int,
+        n_symbols: int,
+        *,
+        slip: float = 0.0,
+        wrong: float = 0.0,
+        missing: float = 0.0,
+        render_mode: str | None = None,
+    ) -> None:
+        self.slip = probability_option("slip", slip)
+        self.wrong = probability_option("wrong", wrong)
+        self.missing = probability_option("missing", missing)
+        self.render_mode = render_mode
+        self.action_space = spaces.Discrete(n_actions)
+        self.observation_space = spaces.MultiDiscrete([n_symbols + 1] * n_slots, start=[MISSING] * n_slots)
+        self.object = 0
+        self.state = 0
+        self._n_objects, self._n_actions = n_objects, n_actions
+        self._n_slots, self._n_symbols = n_slots, n_symbols
+
+    @abstractmethod
+    def _n_states(self) -> int:
+        """Return the number of states of the object that is presented."""
+
+    @abstractmethod
+    def _successor(self, action: int) -> int:
+        """Return the state that an action leads to now, if it does not fail."""
+
+    @abstractmethod
+    def _pattern(self) -> tuple[int, ...]:
+        """Return the pattern that the object shows now."""
+
+    def reset(
+        self, *, seed: int | None = None, options: dict[str, Any] | None = None
+    ) -> tuple[IntArray, dict[str, Any]]:
+        """Present an object in a state, both drawn at random unless ``options`` sets them."""
+        super().reset(seed=seed)
+        self._present(options or {})
+        self._place()
+        return self._look(), self._truth(slipped=False)
+
+    def step(self, action: np.int64) -> tuple[IntArray, float, bool, bool, dict[str, Any]]:
+        """Act and look. There is no reward, and the episode goes on for as long as one likes."""
+        if not self.action_space.contains(action):
+            raise InvalidInputError(f"action: {action!r}; expected 0 to {self._n_actions - 1}")
+        slipped = self.slip > 0 and bool(self.np_random.random() < self.slip)
+        if not slipped:
+            self.state = self._successor(int(action))
+        self._place()
+        return self._look(), 0.0, False, False, self._truth(slipped=slipped)
+
+    def _present(self, options: dict[str, Any]) -> None:
+        """Choose what is presented, by the options of a reset or at random."""
+        for name in options:
+            if name not in ("object", self.state_name):
+                raise unknown_name("reset option", name, ("object", self.state_name))
+        self.object = self._chosen(options, "object", self._n_objects)
+        self.state = self._chosen(options, self.state_name, self._n_states())
+
+    def _chosen(self, options: dict[str, Any], name: str, n: int) -> int:
+        if name not in options:
+            return int(self.np_random.integers(n))
+        chosen = options[name]
+        if not isinstance(chosen, (int, np.integer)) or not 0 <= chosen < n:
+            raise InvalidInputError(f"reset option {name!r}: {chosen!r}; expected 0 to {n - 1}")
+        return int(chosen)
+
+    def _place(self) -> None:
+        """Put the object down in its new state (a hook for worlds that have a place to put it)."""
+
+    def _look(self) -> IntArray:
+        """Return what is detected now, shape [slots]."""
+        observation = np.array(self._detect(), dtype=np.int64)
+        if self.wrong and self.np_random.random() < self.wrong:
+            observation = self.np_random.permutation(self._n_symbols)[: self._n_slots].astype(np.int64)
+        if self.missing:
+            observation[self.np_random.random(self._n_slots) < self.missing] = MISSING
+        return observation
+
+    def _detect(self) -> tuple[int, ...]:
+        """Return the symbols, or ``MISSING``, before any noise of ``wrong`` and ``missing``."""
+        return self._pattern()
+
+    def _truth(self, *, slipped: bool) -> dict[str, Any]:
+        return {
+            "object": self.object,
+            self.state_name: self.state,
+            "pattern": self._pattern(),
+            "slipped": slipped,
+        }
+
+
+class ARcubeWorld(FiniteStateWorld):
     """One ARcube that three actions turn: flip, left, right; front and top are looked at.
 
     Args:
@@ -71,7 +232,7 @@ class ARcubeWorld(gymnasium.Env[IntArray, np.int64]):
     ``reset(options={"object": i, "orientation": j})`` sets what is not to be drawn at random.
     """
 
-    metadata: dict[str, Any] = {"render_modes": []}  # noqa: RUF012 - gymnasium declares it so
+    state_name = "orientation"
 
     def __init__(
         self,
@@ -88,73 +249,26 @@ class ARcubeWorld(gymnasium.Env[IntArray, np.int64]):
         for cube in self.cubes:
             if len(set(cube)) != len(FACES) or len(cube) != len(FACES) or not all(0 <= tag < N_TAGS for tag in cube):
                 raise InvalidInputError(f"cubes: {cube!r}; expected {len(FACES)} different tags from 0 to {N_TAGS - 1}")
-        self.slip = probability_option("slip", slip)
-        self.wrong = probability_option("wrong", wrong)
-        self.missing = probability_option("missing", missing)
-        self.render_mode = render_mode
-        self.action_space = spaces.Discrete(len(ACTION_SOURCES))
-        self.observation_space = spaces.MultiDiscrete([N_TAGS + 1] * 2, start=[MISSING] * 2)
-        self.object = 0
-        self.orientation = 0
+        noise = {"slip": slip, "wrong": wrong, "missing": missing}
+        super().__init__(len(self.cubes), len(ACTION_SOURCES), 2, N_TAGS, render_mode=render_mode, **noise)
 
-    def reset(
-        self, *, seed: int | None = None, options: dict[str, Any] | None = None
-    ) -> tuple[IntArray, dict[str, Any]]:
-        """Present an object in an orientation, both drawn at random unless ``options`` sets them."""
-        super().reset(seed=seed)
-        self._present(options or {})
-        self._place()
-        return self._look(), self._truth(slipped=False)
+    @property
+    def orientation(self) -> int:
+        """The state of a cube, one of ``ORIENTATIONS``."""
+        return self.state
 
-    def step(self, action: np.int64) -> tuple[IntArray, float, bool, bool, dict[str, Any]]:
-        """Turn the cube and look. There is no reward, and the episode goes on for as long as one likes."""
-        if not self.action_space.contains(action):
-            raise InvalidInputError(f"action: {action!r}; expected 0 to {len(ACTION_SOURCES) - 1}")
-        slipped = self.slip > 0 and bool(self.np_random.random() < self.slip)
-        if not slipped:
-            self.orientation = SUCCESSORS[self.orientation][int(action)]
-        self._place()
-        return self._look(), 0.0, False, False, self._truth(slipped=slipped)
+    @orientation.setter
+    def orientation(self, orientation: int) -> None:
+        self.state = orientation
 
-    def _present(self, options: dict[str, Any]) -> None:
-        """Choose what is presented, by the options of a reset or at random."""
-        for name in options:
-            if name not in ("object", "orientation"):
-                raise unknown_name("reset option", name, ("object", "orientation"))
-        self.object = self._chosen(options, "object", len(self.cubes))
-        self.orientation = self._chosen(options, "orientation", len(ORIENTATIONS))
+    def _n_states(self) -> int:
+        return len(ORIENTATIONS)
 
-    def _chosen(self, options: dict[str, Any], name: str, n: int) -> int:
-        if name not in options:
-            return int(self.np_random.integers(n))
-        chosen = options[name]
-        if not isinstance(chosen, (int, np.integer)) or not 0 <= chosen < n:
-            raise InvalidInputError(f"reset option {name!r}: {chosen!r}; expected 0 to {n - 1}")
-        return int(chosen)
+    def _successor(self, action: int) -> int:
+        return SUCCESSORS[self.orientation][action]
 
-    def _place(self) -> None:
-        """Put the cube down in its new orientation (a hook for worlds that have a place to put it)."""
-
-    def _look(self) -> IntArray:
-        """Return what is detected now, shape [2]."""
-        observation = np.array(self._detect(), dtype=np.int64)
-        if self.wrong and self.np_random.random() < self.wrong:
-            observation = self.np_random.permutation(N_TAGS)[:2].astype(np.int64)
-        if self.missing:
-            observation[self.np_random.random(2) < self.missing] = MISSING
-        return observation
-
-    def _detect(self) -> tuple[int, int]:
-        """Return the symbols (front, top), or ``MISSING``, before any noise of ``wrong`` and ``missing``."""
+    def _pattern(self) -> tuple[int, ...]:
         return shown_pattern(self.cubes[self.object], self.orientation)
-
-    def _truth(self, *, slipped: bool) -> dict[str, Any]:
-        return {
-            "object": self.object,
-            "orientation": self.orientation,
-            "pattern": shown_pattern(self.cubes[self.object], self.orientation),
-            "slipped": slipped,
-        }
 
 
 gymnasium.register(id="atg_fg/ARcube-v0", entry_point="atg_fg.worlds:ARcubeWorld")

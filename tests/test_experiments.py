@@ -1,11 +1,15 @@
 from dataclasses import replace
 
+import gymnasium
 import numpy as np
 import pytest
 
 from atg_fg.errors import InvalidInputError, UnknownNameError
 from atg_fg.experiments import TestPlan, TestResult, figure3_points, run_test, run_tests, summarise
+from atg_fg.object_worlds import ObjectWorld
+from atg_fg.objects import FiniteObject, Mechanism, ObjectFamily
 from atg_fg.parameters import ModelParameters
+from atg_fg.patterns import PatternAlphabet
 from atg_fg.presets import preset
 from atg_fg.trial_log import read_trials
 
@@ -107,6 +111,29 @@ def test_unknown_names_are_refused_before_any_work():
         run_test(TestPlan(world="magic", parameters=ModelParameters()), 0)
     with pytest.raises(InvalidInputError, match="jobs: 0"):
         next(run_tests([(QUICK, 0)], jobs=0))
+
+
+@pytest.fixture
+def own_world():
+    """A world of the user's own, by its name: two coins of two sides each, that says so itself."""
+
+    def make(**options):
+        turn = Mechanism.deterministic([[1], [0]])
+        coins = tuple(FiniteObject(turn, ((side,), (side + 1,))) for side in (0, 2))
+        return ObjectWorld(ObjectFamily(("turn",), PatternAlphabet(("up",), 4), coins), **options)
+
+    gymnasium.register(id="own/Coins-v0", entry_point=make)
+    yield "atg_fg:own/Coins-v0"
+    del gymnasium.registry["own/Coins-v0"]
+
+
+def test_a_world_of_ones_own_says_its_assumptions_or_is_of_arcubes(own_world):
+    for world, n_objects, n_aspects in ((own_world, 2, 2), ("atg_fg:atg_fg/ARcube-v0", 50, 24)):
+        records = []
+        plan = TestPlan(world=world, engine="bayes-filter", n_trials=6, n_actions=2, n_objects=50)
+        run_test(plan, 0, on_trial=lambda _, record, found=records: found.append(record))
+        assumptions = records[0].assumptions
+        assert (assumptions.n_objects, assumptions.n_aspects) == (n_objects, n_aspects)
 
 
 class TestRecords:

@@ -21,7 +21,7 @@ from atg_fg.policies import EntropyPolicy, RandomPolicy
 from atg_fg.presets import preset as preset_named
 from atg_fg.structure.memory import memory_for
 from atg_fg.trial import TrialRecord, run_trial
-from atg_fg.worlds import World, make_world
+from atg_fg.worlds import World, check_arcube_world, make_world
 
 N_REMEMBERED = 6
 #: Options of the worlds that have a camera: its last frame is saved, or a film of the trial.
@@ -32,7 +32,7 @@ CAMERAS: Final[dict[str, dict[str, Any]]] = {
 
 
 def demo(
-    world: options.World = "robonaut",
+    world: options.ARcubeWorld = "robonaut",
     engine: options.PresetsEngine = None,
     preset: options.Preset = "default",
     actions: options.Actions = 8,
@@ -50,6 +50,7 @@ def demo(
 
     Example: atg-fg demo --seed 1 --novel
     """
+    check_arcube_world("--world", world)
     options.check_at_least(1, actions=actions)
     options.check_at_least(0, seed=seed)
     options.check_json_option(json_file)

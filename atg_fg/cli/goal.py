@@ -24,7 +24,7 @@ RENDER_MODES: Final = {"rendered": "detections", "robonaut": "rgb_array_list"}
 
 
 def goal(
-    world: options.World = "ideal",
+    world: options.ARcubeWorld = "ideal",
     engine: options.PresetsEngine = None,
     preset: options.Preset = "default",
     cubes: Annotated[int, typer.Option(help="Cubes before the robot, each at a station.")] = 3,

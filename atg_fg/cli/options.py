@@ -21,7 +21,7 @@ from atg_fg.errors import InvalidInputError
 from atg_fg.parameters import ModelParameters
 from atg_fg.policies import POLICIES
 from atg_fg.presets import PRESETS
-from atg_fg.worlds import WORLDS, probability_option
+from atg_fg.worlds import ARCUBE_WORLDS, WORLDS, probability_option
 
 
 def available_cpus() -> int:
@@ -30,6 +30,9 @@ def available_cpus() -> int:
 
 
 World = Annotated[str, typer.Option(help=f"World: {', '.join(WORLDS)}, or module:namespace/Id-v0 of your own.")]
+ARcubeWorld = Annotated[
+    str, typer.Option(help=f"World of ARcubes: {', '.join(ARCUBE_WORLDS)}, or module:namespace/Id-v0 of your own.")
+]
 Engine = Annotated[str, typer.Option(help=f"Inference engine: {', '.join(ENGINES)}.")]
 PresetsEngine = Annotated[
     str | None, typer.Option(help=f"Inference engine: {', '.join(ENGINES)}. The preset's usual one if not given.")
@@ -46,7 +49,7 @@ Jobs = Annotated[
 JsonFile = Annotated[
     str | None, typer.Option("--json", help="Write the result as JSON to this file, or - to print it.")
 ]
-Slip = Annotated[float, typer.Option(help="Probability that an action fails and the cube stays.")]
+Slip = Annotated[float, typer.Option(help="Probability that an action fails and the object stays as it is.")]
 Wrong = Annotated[float, typer.Option(help="Probability that a look shows a pattern drawn at random.")]
 Missing = Annotated[float, typer.Option(help="Probability, a slot, that its symbol is not detected.")]
 Condition = Annotated[

@@ -6,14 +6,13 @@ import json
 import sys
 from contextlib import closing
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Final
 
 import numpy as np
 import typer
 from rich.table import Table
 
 from atg_fg import store
-from atg_fg.arcube import make_arcubes
 from atg_fg.assumptions import arcube_assumptions
 from atg_fg.cli import options
 from atg_fg.cli.story import Story
@@ -26,7 +25,10 @@ from atg_fg.scripted_trial import read_script
 from atg_fg.scripted_trial import replay as replay_script
 from atg_fg.structure.memory import memory_for
 from atg_fg.trial import run_trial
-from atg_fg.worlds import WORLDS, make_world
+from atg_fg.worlds import assumptions_of, make_world_with
+
+#: Objects of the world that ``atg-fg trial`` makes, |O|.
+N_OBJECTS: Final = 100
 
 
 def trial(
@@ -41,7 +43,7 @@ def trial(
     ] = None,
     record: Annotated[Path | None, typer.Option(help="Write the trial's record as JSON lines to this file.")] = None,
     seed: options.Seed = 0,
-    cubes_seed: Annotated[int, typer.Option(help="Seed of the world's 100 cubes.")] = 0,
+    cubes_seed: Annotated[int, typer.Option(help="Seed of the world's 100 objects, cubes or others.")] = 0,
     slip: options.Slip = 0.0,
     wrong: options.Wrong = 0.0,
     missing: options.Missing = 0.0,
@@ -59,16 +61,16 @@ def trial(
     for path in (save_memory, record):
         if path is not None:
             store.check_writable(path)
+    chosen_policy = make_policy(policy)
     parameters = preset_named(preset)
     engine = options.engine_of(engine, parameters, "gtsam")
-    remembered = memory_for(parameters, store.load_memory(memory) if memory else RobotMemory(arcube_assumptions()))
-    inference = begin_trial(engine, remembered, parameters)
-    chosen_policy = make_policy(policy)
-    cubes = {"cubes": make_arcubes(100, cubes_seed)} if world in WORLDS else {}
-    story = Story(options.console(json_file), remembered)
-    with closing(
-        make_world(world, **cubes, **options.world_options(slip, wrong, missing, condition, urdf))
-    ) as made_world:
+    loaded = store.load_memory(memory) if memory else None
+    world_options = options.world_options(slip, wrong, missing, condition, urdf)
+    with closing(make_world_with(world, N_OBJECTS, cubes_seed, **world_options)) as made_world:
+        empty = RobotMemory(assumptions_of(made_world, N_OBJECTS))
+        remembered = memory_for(parameters, empty if loaded is None else loaded)
+        inference = begin_trial(engine, remembered, parameters)
+        story = Story(options.console(json_file), remembered)
         rng = np.random.default_rng(np.random.SeedSequence(seed))
         result = run_trial(made_world, inference, chosen_policy, actions, rng, on_step=story.tell)
     story.verdict(result)

@@ -42,3 +42,9 @@ def test_the_demo_tells_a_new_object(run, tmp_path):
 def test_a_folder_that_cannot_be_made_is_refused(refused, tmp_path):
     (tmp_path / "file").write_text("")
     assert "cannot be written" in refused("demo", "--output", tmp_path / "file" / "out")
+
+
+def test_the_demo_is_of_arcubes_alone(refused, tmp_path):
+    message = refused("demo", "--world", "half-and-half", "--output", tmp_path / "out")
+    assert "--world: 'half-and-half'; expected a world of ARcubes: ideal, rendered, robonaut" in message
+    assert not (tmp_path / "out").exists()

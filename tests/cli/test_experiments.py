@@ -40,6 +40,17 @@ def test_table1_is_the_same_for_any_number_of_jobs(run, tmp_path):
     assert (tmp_path / "1.json").read_bytes() == (tmp_path / "2.json").read_bytes()
 
 
+@pytest.mark.parametrize("world", ["prism", "lid-box", "lock"])
+def test_table1_and_figure3_take_what_the_world_says_for_granted(run, world):
+    for command, score in (("table1", "average"), ("figure3", "points")):
+        arguments = ["--world", world, "--tests", "1", "--actions", "3", "--slip", "0.1", "--json", "-"]
+        status, output, error = run(command, *QUICK, *arguments)
+        assert (status, error) == (0, "")
+        document = json.loads(output)
+        assert document["parameters"]["world"] == world
+        assert document[score]
+
+
 def test_noise_of_the_world_is_an_option(run):
     arguments = ["--slip", "0.2", "--wrong", "0.1", "--missing", "0.1", "--json", "-"]
     status, output, _ = run("table1", *QUICK, "--tests", "1", "--actions", "3", *arguments)
@@ -84,10 +95,10 @@ def test_other_numbers_of_actions_are_refused(text):
     ("arguments", "message"),
     [
         (["--engine", "magic"], "engine: unknown name 'magic'; expected one of: bayes-filter, enumeration, gibbs,"),
-        (["--world", "magic"], "world: unknown name 'magic'; expected one of: ideal, rendered"),
+        (["--world", "magic"], "world: unknown name 'magic'; expected one of: half-and-half, ideal, lid-box"),
         (["--world", "nowhere:some/World-v0"], "world 'nowhere:some/World-v0': cannot be made"),
         (["--preset", "magic"], "preset: unknown name 'magic'; expected one of: default, learned, paper"),
-        (["--policy", "magic"], "policy: unknown name 'magic'; expected one of: entropy, random"),
+        (["--policy", "magic"], "policy: unknown name 'magic'; expected one of: entropy, explore, random"),
         (["--actions", "0"], "--actions: 0; expected a whole number of at least 1"),
         (["--tests", "-1"], "--tests: -1; expected a whole number of at least 1"),
         (["--jobs", "0"], "--jobs: 0; expected"),

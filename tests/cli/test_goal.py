@@ -55,6 +55,8 @@ def test_a_world_with_a_camera_is_filmed(run, tmp_path):
         (["--learning-policy", "greedy"], "'greedy'; expected one of: entropy, explore, random"),
         (["--learning-world", "moon"], "'moon'"),
         (["--world", "moon"], "'moon'"),
+        (["--world", "prism"], "world: 'prism'; expected a world of ARcubes: ideal, rendered, robonaut"),
+        (["--learning-world", "lock"], "learning_world: 'lock'; expected a world of ARcubes"),
         (["--video", "film.gif"], "world with a camera: unknown name 'ideal'; expected one of: rendered, robonaut"),
         (["--world", "rendered", "--video", "film.mp4"], "suffix '.mp4'; expected .gif"),
         (["--resume"], "--resume: no records"),

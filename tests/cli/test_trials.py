@@ -82,6 +82,18 @@ def test_a_trial_refuses_what_it_could_not_save(refused, tmp_path):
     assert "cannot be read" in refused("trial", "--memory", tmp_path / "absent.json")
 
 
+def test_a_trial_takes_what_the_world_says_for_granted(run, refused, tmp_path):
+    memory = tmp_path / "memory.json"
+    quick = ["trial", "--engine", "bayes-filter", "--actions", "3"]
+    status, output, _ = run(*quick, "--world", "lid-box", "--save-memory", memory)
+    assert status == 0
+    assert "right" in output
+    assumptions = store.load_memory(memory).assumptions
+    assert (assumptions.n_objects, assumptions.n_aspects, assumptions.actions[0]) == (100, 8, "open")
+    assert run(*quick, "--world", "lid-box", "--memory", memory)[0] == 0
+    assert "expected 3 actions and [13, 13, 13] symbols" in refused(*quick, "--memory", memory)
+
+
 def test_an_unknown_command_is_refused(refused):
     assert "No such command 'magic'" in refused("magic")
 
