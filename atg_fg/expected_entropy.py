@@ -99,11 +99,18 @@ def next_pattern_joint(model: RecognitionModel, mass: FloatArray) -> NextPattern
     )
 
 
-def pattern_table(model: RecognitionModel, joint: NextPatternJoint) -> FloatArray:
-    """Return J = p(O = i, z | a) of every pattern, shape [A, H, |𝒵|]."""
-    table: FloatArray = joint.unknown[:, :, None] * model.unknown + joint.unreached[:, :, None] * model.known
+def pattern_table(model: RecognitionModel, joint: NextPatternJoint, hypotheses: IntArray) -> FloatArray:
+    """Return J = p(O = i, z | a) of every pattern, shape [A, I, |𝒵|], for the I ``hypotheses`` in question."""
+    table: FloatArray = (
+        joint.unknown[:, hypotheses, None] * model.unknown[hypotheses]
+        + joint.unreached[:, hypotheses, None] * model.known[hypotheses]
+    )
+    place = np.full(model.n_hypotheses, -1)
+    place[hypotheses] = np.arange(len(hypotheses))
     action, hypothesis, state = joint.targets
-    table[action, hypothesis, model.pattern_of[hypothesis, state]] = joint.reached
+    chosen = place[hypothesis] >= 0
+    patterns = model.pattern_of[hypothesis, state][chosen]
+    table[action[chosen], place[hypothesis[chosen]], patterns] = joint.reached[chosen]
     return table
 
 

@@ -147,17 +147,17 @@ class LearnedStructure(BayesFilter):
             return super()._expected_entropies()
         beliefs = self._type_beliefs()
         identity = sum(beliefs, np.zeros(self.model.n_hypotheses))
-        table = np.zeros((self.model.n_actions, self.model.n_hypotheses, self.model.n_patterns))
+        unseen = self.model.n_hypotheses - 1
+        matters = np.union1d(np.flatnonzero(identity > UNIMPORTANT), unseen)
+        table = np.zeros((self.model.n_actions, len(matters), self.model.n_patterns))
         if beliefs[0].sum() > UNIMPORTANT:
-            table += pattern_table(
-                self.model, next_pattern_joint(self.model, beliefs[0][:, None] * self._belief.aspects)
-            )
+            joint = next_pattern_joint(self.model, beliefs[0][:, None] * self._belief.aspects)
+            table += pattern_table(self.model, joint, matters)
         for each, belief in zip(self._followed, beliefs[1:], strict=True):
             owners, patterns = each.filter.predicted_patterns()
-            table[:, owners] += belief[owners, None] * patterns
-        matters = np.flatnonzero(identity > UNIMPORTANT)
-        matters = np.union1d(matters, [self.model.n_hypotheses - 1])  # unseen is always the last
-        return expected_entropies_of_table(table[:, matters], float(identity[-1]), self.model.n_unseen)
+            common, places, own = np.intersect1d(matters, owners, assume_unique=True, return_indices=True)
+            table[:, places] += belief[common, None] * patterns[:, own]
+        return expected_entropies_of_table(table, float(identity[unseen]), self.model.n_unseen)
 
     def _smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
         """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s, of plain ATGs and poses together.

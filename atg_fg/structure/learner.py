@@ -36,7 +36,7 @@ MAX_BELIEVED: Final = 3
 BELIEVED_WITHIN: Final = 7.0
 #: Structures that are kept up, and how many nats they may be behind the best.
 MAX_CANDIDATES: Final = 5
-KEPT_WITHIN: Final = 20.0
+KEPT_WITHIN: Final = 10.0
 #: Proposals of a search that are scored on all trials.
 MAX_PROPOSALS: Final = 4
 #: Rates that differ by less than this factor are as good as the same.
@@ -193,9 +193,10 @@ class StructureLearner:
         return candidate
 
     def _worth_keeping(self) -> list[Candidate]:
-        """Return the best candidates, best first, without those that are far behind."""
+        """Return the best candidates, best first, without those that are far behind or explain no trial."""
         plain = np.array(self._plain)
-        scored = sorted(((each.score(plain), each) for each in self._candidates), key=lambda pair: -pair[0])
+        useful = [each for each in self._candidates if each.responsibilities(plain).max() > 0.5]
+        scored = sorted(((each.score(plain), each) for each in useful), key=lambda pair: -pair[0])
         best = max(float(plain.sum()), scored[0][0]) if scored else 0.0
         return [each for score, each in scored[:MAX_CANDIDATES] if score >= best - KEPT_WITHIN]
 

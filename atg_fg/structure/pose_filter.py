@@ -109,16 +109,17 @@ class PoseFilter:
         for slot, probabilities in enumerate(shown):
             probability *= probabilities[index, seen[:, slot]]
         kept, truth = self._condition(probability, np.ones(1))
-        seen, index = seen[kept], np.arange(len(kept))
-        tables = self._contents[self.rows.table]
-        known = np.ones(len(kept), dtype=bool)
+        right = np.flatnonzero(truth > soft.SAME)
+        source, tables = kept[right], self._contents[self.rows.table[right]]
+        seen, index = seen[source], np.arange(len(right))
+        known = np.ones(len(right), dtype=bool)
         for slot, probabilities in enumerate(shown):
-            register = registers[kept, slot]
+            register, expected = registers[source, slot], probabilities[source]
             before = tables[index, register]
-            known &= before[index, seen[:, slot]] > 1.0 - soft.TINY
-            tables[index, register], revealed = soft.reveal(before, probabilities[kept], seen[:, slot], truth)
-            self._count_reveals(before, probabilities[kept], revealed)
-        self._merge(tables, changed=~known & (truth > soft.TINY))
+            known &= before[index, seen[:, slot]] > 1.0 - soft.SAME
+            tables[index, register], revealed = soft.reveal(before, expected, seen[:, slot], truth[right])
+            self._count_reveals(right, before, expected, revealed)
+        self._merge(tables[~known], right[~known])
 
     def observe_likelihood(self, likelihood: FloatArray) -> None:
         """Take in any evidence as a likelihood of each pattern, shape [|𝒵|], or [H, |𝒵|] for a look of each owner."""
@@ -129,18 +130,19 @@ class PoseFilter:
         joint *= likelihood[rows.owner]
         probability = joint.sum(axis=1)
         kept, truth = self._condition(probability, likelihood.sum(axis=1))
-        joint = joint[kept] / np.maximum(probability[kept], soft.TINY**20)[:, None]
+        right = np.flatnonzero(truth > soft.SAME)
+        source, tables = kept[right], self._contents[self.rows.table[right]]
+        joint = joint[source] / probability[source, None]
         one_hot = [symbols[:, slot, None] == np.arange(self._alphabet.n_symbols) for slot in range(len(shown))]
         posteriors = [joint @ each.astype(np.float64) for each in one_hot]
-        tables = self._contents[self.rows.table]
-        index = np.arange(len(kept))
+        index = np.arange(len(right))
         for slot, posterior in enumerate(posteriors):
-            register = registers[kept, slot]
+            register, expected = registers[source, slot], shown[slot][source]
+            before = tables[index, register]
             taken = sum((each for other, each in enumerate(posteriors) if other != slot), np.zeros_like(posterior))
-            before, probabilities = tables[index, register], shown[slot][kept]
-            tables[index, register], revealed = soft.reweigh(before, probabilities, posterior, taken, truth)
-            self._count_reveals(before, probabilities, revealed)
-        self._merge(tables, changed=truth > soft.TINY)
+            tables[index, register], revealed = soft.reweigh(before, expected, posterior, taken, truth[right])
+            self._count_reveals(right, before, expected, revealed)
+        self._merge(tables, right)
 
     def predicted_patterns(self) -> tuple[IntArray, FloatArray]:
         """Return the owners that matter, shape [I], and p(next pattern | action, owner) of each, shape [A, I, |𝒵|]."""
@@ -226,53 +228,53 @@ class PoseFilter:
         total = log_sum_exp(logarithms)
         return np.exp(logarithms - total) if np.isfinite(total) else np.zeros_like(logarithms)
 
-    def _count_reveals(self, before: FloatArray, shown: FloatArray, revealed: FloatArray) -> None:
+    def _count_reveals(self, rows: IntArray, before: FloatArray, shown: FloatArray, revealed: FloatArray) -> None:
         """Count how probably a slot's register was revealed by a look, and its symbol drawn from all symbols.
 
         Rivals for one trial are not counted for.
 
         Args:
-            before: The register's table, shape [R, S].
-            shown: The probability of each of its symbols, shape [R, S].
-            revealed: The probability that it was revealed and has a symbol, shape [R, S].
+            rows: Index of each of the rows in question, shape [I].
+            before: The register's table, shape [I, S].
+            shown: The probability of each of its symbols, shape [I, S].
+            revealed: The probability that it was revealed and has a symbol, shape [I, S].
         """
         if self._log_weights is not None:
             return
         from_all = self._rates.repeat / self._alphabet.n_symbols * soft.unrevealed(before[:, None, :])
         share = np.minimum(from_all / np.maximum(shown - before, soft.TINY), 1.0)
-        self.rows.events[:, REVEAL] += revealed.sum(axis=1)
-        self.rows.events[:, REPEAT] += (revealed * share).sum(axis=1)
+        self.rows.events[rows, REVEAL] += revealed.sum(axis=1)
+        self.rows.events[rows, REPEAT] += (revealed * share).sum(axis=1)
 
-    def _merge(self, tables: FloatArray, changed: np.ndarray) -> None:
+    def _merge(self, tables: FloatArray, changed: IntArray) -> None:
         """Make one row of those with the same owner and pose, and keep each different table once.
 
         Args:
-            tables: Of each row, shape [R, P, S].
-            changed: Which of them differ from those that the rows had before, shape [R].
+            tables: New ones, shape [I, P, S].
+            changed: Index of the row that each belongs to, shape [I].
         """
         rows, n_old = self.rows, len(self._contents)
+        contents = [self._contents, tables]
         table = rows.table.copy()
-        table[changed] = n_old + np.arange(int(changed.sum()))
+        table[changed] = n_old + np.arange(len(changed))
         key = rows.owner * len(self._poses.registers) + rows.pose
         order = np.argsort(key, kind="stable")
         first, group = _runs(key[order])
         weight = np.add.reduceat(rows.weight[order], first)
         share = rows.weight[order] / np.maximum(weight, np.finfo(float).tiny)[group]
         events = np.add.reduceat(rows.events[order] * share[:, None], first)
-        lowest = np.minimum.reduceat(table[order], first)
-        mixed = lowest != np.maximum.reduceat(table[order], first)
-        new = [tables[changed]]
+        merged = np.minimum.reduceat(table[order], first)
+        mixed = merged != np.maximum.reduceat(table[order], first)
         if mixed.any():
             members = np.flatnonzero(mixed[group])
             starts, _ = _runs(group[members])
-            weighted = tables[order[members]] * share[members][:, None, None]
-            new.append(np.add.reduceat(weighted, starts))
-            lowest[mixed] = n_old + int(changed.sum()) + np.arange(int(mixed.sum()))
-        used, table = np.unique(lowest, return_inverse=True)
-        made = np.concatenate(new)[used[used >= n_old] - n_old]
-        kept = used[used < n_old]
-        self._contents = np.concatenate((self._contents[kept], made))
-        self._shown = np.concatenate((self._shown[kept], soft.symbol_probabilities(made, self._rates.repeat)))
+            own = np.concatenate(contents)[table[order[members]]]
+            contents.append(np.add.reduceat(own * share[members][:, None, None], starts))
+            merged[mixed] = n_old + len(changed) + np.arange(len(starts))
+        used, table = np.unique(merged, return_inverse=True)
+        self._contents = np.concatenate(contents)[used]
+        shown = soft.symbol_probabilities(self._contents[used >= n_old], self._rates.repeat)
+        self._shown = np.concatenate((self._shown[used[used < n_old]], shown))
         last = order[first]
         self.rows = Rows(rows.owner[last], rows.pose[last], weight, table, events)
 

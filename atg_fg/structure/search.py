@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -18,6 +18,10 @@ from atg_fg.patterns import FloatArray, IntArray
 from atg_fg.structure.quick_score import QuickScore
 from atg_fg.structure.shared_structure import SharedStructure
 from atg_fg.structure.trials import RawTrial
+
+
+#: Nats that a structure may be worse than none by the quick score, and still be proposed.
+HOPELESS: Final = 5.0
 
 
 @dataclass(frozen=True)
@@ -47,7 +51,8 @@ class Proposals(NamedTuple):
     """What a search came upon.
 
     Attributes:
-        structures: In canonical form, all different, best first by the quick score.
+        structures: In canonical form, all different, best first by the quick score; without those that are
+            ``HOPELESS`` by it.
         n_evaluations: Candidates that were scored.
     """
 
@@ -163,7 +168,9 @@ class _Chains:
             if structure not in totals:
                 score = np.logaddexp(self._score(np.array([structure.sources]))[0], self._score.plain).sum()
                 totals[structure] = float(score) + structure.log_prior
-        return tuple(sorted(totals, key=lambda structure: -totals[structure]))
+        least = float(self._score.plain.sum()) - HOPELESS
+        hopeful = [structure for structure, total in totals.items() if total >= least]
+        return tuple(sorted(hopeful, key=lambda structure: -totals[structure]))
 
 
 def _best_of_each(values: FloatArray, group: IntArray, n_groups: int) -> IntArray:

@@ -84,9 +84,9 @@ def test_trials_of_different_lengths_are_scored_as_they_are_alone():
     together = score_trials(CUBE, trials, Rates(), ARCUBES.alphabet)
     for number, trial in enumerate(trials):
         alone = score_trials(CUBE, [trial], Rates(), ARCUBES.alphabet)
-        assert together.log_evidence[number] == pytest.approx(alone.log_evidence[0], abs=1e-9)
-        np.testing.assert_allclose(together.contents[number], alone.contents[0], atol=1e-9)
-        np.testing.assert_allclose(together.events[number], alone.events[0], atol=1e-9)
+        assert together.log_evidence[number] == pytest.approx(alone.log_evidence[0], abs=1e-5)
+        np.testing.assert_allclose(together.contents[number], alone.contents[0], atol=1e-5)
+        np.testing.assert_allclose(together.events[number], alone.events[0], atol=1e-5)
 
 
 def test_a_look_at_nothing_says_nothing():
