@@ -21,6 +21,8 @@ from atg_fg.policies import POLICIES, GoalPolicy, make_policy
 from atg_fg.presets import PRESETS, preset
 from atg_fg.recognition import RecognitionGraph
 from atg_fg.store import load_memory, save_memory
+from atg_fg.structure.memory import StructuredMemory
+from atg_fg.structure.shared_structure import SharedStructure
 from atg_fg.trial import TrialRecord, run_trial
 from atg_fg.worlds import WORLDS, assumptions_of, make_world
 
@@ -49,6 +51,8 @@ __all__ = [
     "PatternAlphabet",
     "RecognitionGraph",
     "RobotMemory",
+    "SharedStructure",
+    "StructuredMemory",
     "TestPlan",
     "TestResult",
     "TrialRecord",

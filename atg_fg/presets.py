@@ -13,11 +13,14 @@ from atg_fg.store import read_text_file
 
 PRESET_FORMAT: Final = "atg-fg/preset"
 _PARAMETERS: Final = ("transition_concentration", "observation_noise", "learn_in_trial")
+#: Left out where it is as usual.
+_OPTIONAL: Final = ("learn_structure",)
 
 
 def write_preset(parameters: ModelParameters, **about: Any) -> dict[str, Any]:
     """Return parameters as a preset document, with what is to be known of where they come from."""
     values = {name: getattr(parameters, name) for name in _PARAMETERS}
+    values |= {name: True for name in _OPTIONAL if getattr(parameters, name)}
     return {"format": PRESET_FORMAT, "version": 1, "parameters": values, **about}
 
 
@@ -31,7 +34,7 @@ def read_preset(text: str, place: str) -> ModelParameters:
     if not isinstance(document, dict) or not {"format", "version", "parameters"} <= document.keys():
         raise InvalidInputError(f"{place}: expected an object with format, version and parameters")
     check_format(document, PRESET_FORMAT, place)
-    values = read_object(document["parameters"], f"{place}: parameters", _PARAMETERS)
+    values = read_object(document["parameters"], f"{place}: parameters", _PARAMETERS, _OPTIONAL)
     try:
         return ModelParameters(**values)
     except InvalidInputError as error:

@@ -1,3 +1,5 @@
+import gzip
+import json
 from dataclasses import replace
 
 import gymnasium
@@ -211,3 +213,14 @@ class TestSmoothedLearning:
     def test_where_everything_is_seen_it_changes_nothing(self):
         plan = replace(self.PLAN, world_options={})
         assert run_test(plan, 1) == run_test(replace(plan, smoothed_learning=False), 1)
+
+
+def test_records_of_presets_without_structure_keep_their_header(tmp_path):
+    plan = replace(QUICK, parameters=preset("paper"), n_trials=1)
+    run_test(plan, 0, tmp_path)
+    header = json.loads(gzip.decompress((tmp_path / "test-0000.jsonl.gz").read_bytes()).splitlines()[0])
+    assert header["parameters"] == {
+        "transition_concentration": 1e-8,
+        "observation_noise": 1e-8,
+        "learn_in_trial": False,
+    }

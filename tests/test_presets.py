@@ -12,6 +12,7 @@ MEASURED = ModelParameters(0.02, 0.001)
 def test_presets_are_those_of_the_model_page():
     assert preset("paper") == ModelParameters(1e-8, 1e-8, learn_in_trial=False)
     assert preset("default") == ModelParameters(1e-8, 1e-8, learn_in_trial=True)
+    assert preset("learned") == ModelParameters(1e-8, 1e-8, learn_in_trial=True, learn_structure=True)
     assert ModelParameters() == PRESETS["default"]
 
 
@@ -30,6 +31,9 @@ def test_a_preset_of_ones_own_is_a_file(tmp_path):
     file = tmp_path / "mine.json"
     file.write_text(json.dumps(write_preset(MEASURED, command="measure it")))
     assert preset(str(file)) == MEASURED
+    assert "learn_structure" not in file.read_text()
+    file.write_text(json.dumps(write_preset(PRESETS["learned"])))
+    assert preset(str(file)) == PRESETS["learned"]
 
 
 def test_a_file_that_is_not_there_is_refused_by_name():

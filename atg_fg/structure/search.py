@@ -19,7 +19,6 @@ from atg_fg.structure.quick_score import QuickScore
 from atg_fg.structure.shared_structure import SharedStructure
 from atg_fg.structure.trials import RawTrial
 
-
 #: Nats that a structure may be worse than none by the quick score, and still be proposed.
 HOPELESS: Final = 5.0
 

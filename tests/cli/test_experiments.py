@@ -118,3 +118,12 @@ def test_figure3_refuses_what_it_could_not_write_before_it_starts(refused, tmp_p
     assert "suffix 'jpeg'; expected .png" in refused("figure3", "--plot", tmp_path / "figure.jpeg")
     assert "cannot be written" in refused("figure3", "--csv", tmp_path / "no" / "points.csv")
     assert os.listdir(tmp_path) == []
+
+
+def test_the_preset_learned_chooses_its_engine(run, refused):
+    quick = ["--preset", "learned", "--trials", "4", "--actions", "3", "--tests", "1", "--jobs", "1"]
+    status, output, _ = run("table1", *quick, "--json", "-")
+    assert status == 0
+    assert json.loads(output)["parameters"]["engine"] == "learned-structure"
+    assert "engine 'gtsam': does not know learn_structure" in refused("table1", *quick, "--engine", "gtsam")
+    assert json.loads(run("table1", *QUICK[2:], "--tests", "1", "--json", "-")[1])["parameters"]["engine"] == "gtsam"

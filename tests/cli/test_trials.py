@@ -103,3 +103,20 @@ def test_help_of_every_command_carries_an_example(run, command):
     status, output, _ = run(*command, "--help")
     assert status == 0
     assert not command or "Example: atg-fg" in output
+
+
+def test_structure_is_learned_from_trial_to_trial(run, tmp_path):
+    file = tmp_path / "memory.json"
+    assert run("trial", "--preset", "learned", "--save-memory", file)[0] == 0
+    assert run("trial", "--preset", "learned", "--seed", "1", "--memory", file, "--save-memory", file)[0] == 0
+    assert len(store.load_memory(file).learner.trials) == 2
+    # Other presets and engines take the same file.
+    assert run("trial", "--seed", "2", "--memory", file, "--engine", "bayes-filter")[0] == 0
+
+
+def test_a_memory_of_before_begins_to_learn_structure(run, tmp_path):
+    file = tmp_path / "memory.json"
+    assert run("trial", "--engine", "bayes-filter", "--save-memory", file)[0] == 0
+    assert "structure" not in json.loads(file.read_text())
+    assert run("trial", "--preset", "learned", "--memory", file, "--save-memory", file)[0] == 0
+    assert len(store.load_memory(file).learner.trials) == 1
