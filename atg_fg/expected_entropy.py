@@ -25,13 +25,13 @@ class Targets(NamedTuple):
 
 
 class NextPatternJoint(NamedTuple):
-    """p(O = i, z_{t+1} | a, z_0:t) for a single pattern z of each kind.
+    """p(O = i, z_{t+1} | a, z_0:t) for a single pattern z of each kind; more axes are more beliefs.
 
     Attributes:
-        unknown: For a pattern the object does not know, shape [A, H].
-        unreached: For a pattern it knows and to which no counted edge leads, shape [A, H].
+        unknown: For a pattern the object does not know, shape [..., A, H].
+        unreached: For a pattern it knows and to which no counted edge leads, shape [..., A, H].
         targets: The states that counted edges lead to.
-        reached: For the pattern of each target, shape [R].
+        reached: For the pattern of each target, shape [..., R].
     """
 
     unknown: FloatArray
@@ -40,32 +40,42 @@ class NextPatternJoint(NamedTuple):
     reached: FloatArray
 
 
-def expected_entropies(model: RecognitionModel, joint: NextPatternJoint, unseen: float) -> FloatArray:
-    """Return Σ_z p(z|a) H(O|z) = Σ_z p ln p − Σ_i Σ_z J ln J + p(unseen) ln U for J = p(O = i, z | a), shape [A].
+def expected_entropies(model: RecognitionModel, joint: NextPatternJoint, unseen: float | FloatArray) -> FloatArray:
+    """Return Σ_z p(z|a) H(O|z) = Σ_z p ln p − Σ_i Σ_z J ln J + p(unseen) ln U for J = p(O = i, z | a), shape [..., A].
 
     Args:
         model: The tables in force.
         joint: J.
-        unseen: p(unseen | z_0:t).
+        unseen: p(unseen | z_0:t), a number or of shape [..., 1].
     """
     targets = joint.targets
-    excess = joint.reached - joint.unreached[targets.action, targets.hypothesis]
+    of_target = joint.unreached[..., targets.action, targets.hypothesis]
     cells = targets.action * model.n_patterns + model.pattern_of[targets.hypothesis, targets.state]
-    shape = (model.n_actions, model.n_patterns)
-    predictive = joint.unknown @ model.unknown + joint.unreached @ model.known
-    predictive += np.bincount(cells, weights=excess, minlength=shape[0] * shape[1]).reshape(shape)
+    shape = (*joint.unreached.shape[:-1], model.n_patterns)
+    flat = (-1, model.n_hypotheses)
+    predictive = joint.unknown.reshape(flat) @ model.unknown + joint.unreached.reshape(flat) @ model.known
+    predictive = predictive.reshape(shape)
+    predictive += sums(joint.reached - of_target, cells, shape[-2] * shape[-1]).reshape(shape)
     # Subtracting may leave a rounding error below zero.
     np.maximum(predictive, 0.0, out=predictive)
 
     unreached = x_log_x(joint.unreached)
-    reached = x_log_x(joint.reached) - unreached[targets.action, targets.hypothesis]
+    reached = x_log_x(joint.reached) - unreached[..., targets.action, targets.hypothesis]
     joint_terms = (
         unreached @ model.n_known
         + x_log_x(joint.unknown) @ (model.n_patterns - model.n_known)
-        + np.bincount(targets.action, weights=reached, minlength=model.n_actions)
+        + sums(reached, targets.action, model.n_actions)
     )
-    entropies: FloatArray = x_log_x(predictive).sum(axis=1) - joint_terms + unseen * np.log(model.n_unseen)
+    entropies: FloatArray = x_log_x(predictive).sum(axis=-1) - joint_terms + unseen * np.log(model.n_unseen)
     return np.maximum(entropies, 0.0)
+
+
+def sums(weights: FloatArray, cells: IntArray, n_cells: int) -> FloatArray:
+    """Return the sum of all ``weights`` [..., R] whose cell, ``cells`` [R], is the same, shape [..., n_cells]."""
+    n_rows = int(np.prod(weights.shape[:-1]))
+    everywhere = (n_cells * np.arange(n_rows)[:, None] + cells).ravel()
+    summed = np.bincount(everywhere, weights=weights.ravel(), minlength=n_rows * n_cells)
+    return summed.astype(np.float64).reshape(*weights.shape[:-1], n_cells)
 
 
 def edge_arrivals(model: RecognitionModel, mass: FloatArray) -> FloatArray:

@@ -20,7 +20,7 @@ from atg_fg.memory import RobotMemory
 from atg_fg.parameters import ModelParameters
 from atg_fg.policies import make_policy
 from atg_fg.smoothed_learning import smoothed_patterns
-from atg_fg.statistics import mean, standard_error, wilson_interval
+from atg_fg.statistics import mean, mean_interval, standard_error, wilson_interval
 from atg_fg.store import make_folder
 from atg_fg.structure.memory import memory_for
 from atg_fg.trial import TrialRecord, run_trial
@@ -40,9 +40,10 @@ class TestPlan:
         parameters: α, δ and whether to learn within the trial.
         smoothed_learning: Whether the memory learns the patterns that are probable given all evidence of a trial,
             rather than those that were seen whole.
-        n_actions: Actions a trial.
+        n_actions: Actions a trial; the most, if trials end when the verdict is settled.
         n_trials: Trials a test.
         n_objects: |O|, unless a user's own world says another in its assumptions.
+        settled: Entropy of the verdict in nats at which a trial ends; ``None`` if none ends for that.
     """
 
     __test__ = False  # the paper calls it a test; pytest should not collect it
@@ -56,13 +57,14 @@ class TestPlan:
     n_actions: int = 10
     n_trials: int = 100
     n_objects: int = 100
+    settled: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("n_actions", "n_trials", "n_objects"):
             if getattr(self, name) < 1:
                 raise InvalidInputError(f"{name}: {getattr(self, name)}; expected a whole number of at least 1")
         check_engine(self.engine, self.parameters)
-        make_policy(self.policy)
+        make_policy(self.policy, self.settled)
 
     def make_world(self, objects_seed: int) -> World:
         """Return this plan's world, with objects drawn by ``objects_seed`` unless it is a user's own."""
@@ -81,6 +83,7 @@ class TestResult:
         success: (trials right in both, trials).
         lost: Trials that ended because the world lost the object.
         undecided: Trials in which nothing at all was seen.
+        actions: Number of actions of each trial.
     """
 
     __test__ = False
@@ -91,6 +94,7 @@ class TestResult:
     success: tuple[int, int]
     lost: int = 0
     undecided: int = 0
+    actions: tuple[int, ...] = ()
 
 
 def run_test(
@@ -115,7 +119,7 @@ def run_test(
         InvalidInputError: The records are of another test, or already there while ``resume`` is false.
     """
     objects_seed, *trial_seeds = np.random.SeedSequence(seed).spawn(1 + plan.n_trials)
-    policy = make_policy(plan.policy)
+    policy = make_policy(plan.policy, plan.settled)
     score = _Score()
     with closing(plan.make_world(int(objects_seed.generate_state(1)[0]))) as world:
         memory = memory_for(plan.parameters, RobotMemory(assumptions_of(world, plan.n_objects)))
@@ -180,6 +184,7 @@ class _Score:
     def __init__(self) -> None:
         self.n_trials = self.identified = self.recognised = self.judged_known = self.successes = 0
         self.lost = self.undecided = 0
+        self._actions: list[int] = []
         self._presented: set[object] = set()
         self._made_from: dict[str, object] = {}
 
@@ -191,6 +196,7 @@ class _Score:
         self.n_trials += 1
         self.lost += outcome.verdict == "lost"
         self.undecided += outcome.verdict == "undecided"
+        self._actions.append(len(outcome.actions))
         seen_before = outcome.object in self._presented
         identified = outcome.verdict == ("known" if seen_before else "novel")
         right_match = outcome.matched is not None and self._made_from.get(outcome.matched) == outcome.object
@@ -211,6 +217,7 @@ class _Score:
             (self.successes, self.n_trials),
             self.lost,
             self.undecided,
+            tuple(self._actions),
         )
 
 
@@ -261,6 +268,13 @@ def summarise(results: Iterable[TestResult]) -> dict[str, Any]:
         "lost": sum(test.lost for test in tests),
         "undecided": sum(test.undecided for test in tests),
     }
+
+
+def actions_a_trial(results: Iterable[TestResult]) -> dict[str, Any]:
+    """Return the mean number of actions of a trial, and its interval: all trials of all tests count as one sample."""
+    numbers = [number for test in results for number in test.actions]
+    interval = mean_interval(numbers)
+    return {"mean": mean(numbers), "interval95": None if interval is None else list(interval)}
 
 
 def pooled_interval(tests: Sequence[TestResult], score: str) -> tuple[float, float]:

@@ -8,6 +8,7 @@ probability zero. A transition row is never stored: it is ``stay · base`` plus 
 
 from __future__ import annotations
 
+from copy import copy
 from typing import NamedTuple
 
 import numpy as np
@@ -166,6 +167,33 @@ class RecognitionModel:
         ) + noise
         table[:, COLLECTION] = self.unknown_rate * (self.unknown @ evidence.likelihood) + noise
         return table
+
+    def restricted(self, hypotheses: IntArray) -> RecognitionModel:
+        """Return the tables of some hypotheses, *unseen* the last of them; they share nothing that can change.
+
+        Args:
+            hypotheses: Their indices, ascending, shape [H'].
+        """
+        part = copy(self)
+        part.n_hypotheses = len(hypotheses)
+        for name in ("prior", "n_known", "aspect_of", "pattern_of", "base", "known", "unknown", "unknown_rate"):
+            setattr(part, name, getattr(self, name)[hypotheses])
+        part.counted, part.stay = self.counted[:, hypotheses], self.stay[:, hypotheses]
+        number = np.full(self.n_hypotheses, -1)
+        number[hypotheses] = np.arange(len(hypotheses))
+        kept = number[self.edges.hypothesis] >= 0
+        edges = self.edges
+        part.edges = Edges(
+            edges.action[kept],
+            number[edges.hypothesis[kept]],
+            edges.source[kept],
+            edges.target[kept],
+            edges.weight[kept],
+        )
+        part.edge_probability = self.edge_probability[kept]
+        shape = (part.n_actions, part.n_hypotheses, part.n_states)
+        part.edge_cells = np.ravel_multi_index((part.edges.action, part.edges.hypothesis, part.edges.target), shape)
+        return part
 
     def learn(self, previous: int | None, action: int | None, pattern: int | None) -> Revelation | None:
         """Extend every hypothesis by what was just seen (``learn_in_trial``), for the steps to come.

@@ -37,6 +37,12 @@ def mean(values: Sequence[float]) -> float | None:
     return math.fsum(values) / len(values) if values else None
 
 
+def mean_interval(values: Sequence[float]) -> tuple[float, float] | None:
+    """Return the normal 95 % interval of the mean, or ``None`` for fewer than two values."""
+    centre, error = mean(values), standard_error(values)
+    return None if centre is None or error is None else (centre - Z_95 * error, centre + Z_95 * error)
+
+
 def standard_error(values: Sequence[float]) -> float | None:
     """Return the standard error of the mean, or ``None`` for fewer than two values."""
     if len(values) < 2:

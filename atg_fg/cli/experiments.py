@@ -14,7 +14,7 @@ from rich.table import Table
 from atg_fg import figures, store
 from atg_fg.cli import options
 from atg_fg.errors import InvalidInputError
-from atg_fg.experiments import TestPlan, TestResult, figure3_points, run_tests, summarise
+from atg_fg.experiments import TestPlan, TestResult, actions_a_trial, figure3_points, run_tests, summarise
 from atg_fg.plots import plot_success
 from atg_fg.presets import preset as preset_named
 
@@ -31,6 +31,7 @@ def table1(
     policy: options.Policy = "entropy",
     tests: options.Tests = 5,
     actions: options.Actions = 10,
+    settled: options.Settled = None,
     trials: options.Trials = 100,
     seed: options.Seed = 0,
     slip: options.Slip = 0.0,
@@ -52,6 +53,7 @@ def table1(
     """
     options.check_at_least(1, tests=tests, actions=actions, trials=trials, jobs=jobs)
     options.check_at_least(0, seed=seed)
+    options.check_settled_option(settled)
     options.check_json_option(json_file)
     if resume and records is None:
         raise InvalidInputError("--resume: no records to go on from; expected --records with their folder")
@@ -67,6 +69,7 @@ def table1(
         smoothed_learning=smoothed_learning,
         n_actions=actions,
         n_trials=trials,
+        settled=settled,
     )
     with options.progress_bar("tests", tests) as advance:
         results = []
@@ -75,6 +78,8 @@ def table1(
             results.append(result)
             advance()
     summary = summarise(results)
+    if settled is not None:
+        summary["actions_a_trial"] = actions_a_trial(results)
     parameters = {
         "world": world,
         "engine": engine,
@@ -89,10 +94,12 @@ def table1(
         "missing": missing,
         **world_options,
         **({"smoothed_learning": True} if smoothed_learning else {}),
+        **({} if settled is None else {"settled": settled}),
     }
     options.write_json({"command": "table1", "parameters": parameters, **summary}, json_file)
     if json_file != "-":
-        title = f"Table 1: {world} world, preset {preset}, {policy} policy, {actions} actions a trial, engine {engine}"
+        number = f"{actions} actions" if settled is None else f"up to {actions} actions"
+        title = f"Table 1: {world} world, preset {preset}, {policy} policy, {number} a trial, engine {engine}"
         options.console().print(_table1(title, results, summary))
 
 
@@ -109,11 +116,20 @@ def _table1(title: str, results: Iterable[TestResult], summary: dict[str, Any]) 
     table.add_row("average", *(_percent(summary["average"][score]) for score in scores), style="bold")
     intervals = (summary["interval95"][score] for score in scores)
     table.add_row("95% interval", *(f"{100 * low:.1f}-{100 * high:.1f}%" for low, high in intervals))
+    if "actions_a_trial" in summary:
+        table.add_row("actions a trial", _mean_with_interval(summary["actions_a_trial"]))
     for ending in ("lost", "undecided"):
         if summary[ending]:
             table.add_row(f"{ending} trials", str(summary[ending]))
     table.add_row("paper", *(_percent(PAPER_TABLE1[score]) for score in scores))
     return table
+
+
+def _mean_with_interval(number: dict[str, Any]) -> str:
+    if number["interval95"] is None:
+        return f"{number['mean']:.2f}"
+    low, high = number["interval95"]
+    return f"{number['mean']:.2f} ({low:.2f}-{high:.2f})"
 
 
 def _percent(rate: float | None) -> str:

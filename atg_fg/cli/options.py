@@ -19,7 +19,7 @@ from atg_fg.engines import ENGINES
 from atg_fg.engines.learned_structure import LearnedStructure
 from atg_fg.errors import InvalidInputError
 from atg_fg.parameters import ModelParameters
-from atg_fg.policies import POLICIES
+from atg_fg.policies import POLICIES, check_settled
 from atg_fg.presets import PRESETS
 from atg_fg.worlds import ARCUBE_WORLDS, WORLDS, probability_option
 
@@ -39,6 +39,10 @@ PresetsEngine = Annotated[
 ]
 Preset = Annotated[str, typer.Option(help=f"Model parameters: {', '.join(PRESETS)}, or a .json file of your own.")]
 Policy = Annotated[str, typer.Option(help=f"Policy: {', '.join(POLICIES)}.")]
+Settled = Annotated[
+    float | None,
+    typer.Option(help="End a trial when the entropy of the verdict is at most this, nats; --actions is then the most."),
+]
 Seed = Annotated[int, typer.Option(help="Seed; test number k uses seed + k.")]
 Actions = Annotated[int, typer.Option(help="Actions a trial.")]
 Tests = Annotated[int, typer.Option(help="Number of tests.")]
@@ -88,6 +92,12 @@ def check_at_least(least: int, **numbers: int | None) -> None:
         if value is not None and value < least:
             option = f"--{name.replace('_', '-')}"
             raise InvalidInputError(f"{option}: {value}; expected a whole number of at least {least}")
+
+
+def check_settled_option(settled: float | None) -> None:
+    """Refuse ``--settled`` if it is given and no finite entropy above 0."""
+    if settled is not None:
+        check_settled(settled, "--settled")
 
 
 def check_json_option(path: str | None) -> None:

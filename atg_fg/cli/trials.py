@@ -37,6 +37,7 @@ def trial(
     preset: options.Preset = "default",
     policy: options.Policy = "entropy",
     actions: options.Actions = 10,
+    settled: options.Settled = None,
     memory: Annotated[Path | None, typer.Option(help="Memory file to start from; empty if not given.")] = None,
     save_memory: Annotated[
         Path | None, typer.Option(help="Save the memory with what was learned to this file.")
@@ -57,11 +58,12 @@ def trial(
     """
     options.check_at_least(1, actions=actions)
     options.check_at_least(0, seed=seed, cubes_seed=cubes_seed)
+    options.check_settled_option(settled)
     options.check_json_option(json_file)
     for path in (save_memory, record):
         if path is not None:
             store.check_writable(path)
-    chosen_policy = make_policy(policy)
+    chosen_policy = make_policy(policy, settled)
     parameters = preset_named(preset)
     engine = options.engine_of(engine, parameters, "gtsam")
     loaded = store.load_memory(memory) if memory else None
@@ -75,7 +77,9 @@ def trial(
         result = run_trial(made_world, inference, chosen_policy, actions, rng, on_step=story.tell)
     story.verdict(result)
     learned = learn_from(result, remembered)
-    header = {"engine": engine, "policy": policy, "preset": preset, "world": world, "seed": seed}
+    header: dict[str, Any] = {"engine": engine, "policy": policy, "preset": preset, "world": world, "seed": seed}
+    if settled is not None:
+        header["settled"] = settled
     lines = result.to_json_lines(**header)
     if record is not None:
         store.write_bytes_atomically(record, lines.encode())

@@ -10,6 +10,7 @@ import numpy as np
 from atg_fg.belief import IdentityBelief, log_of
 from atg_fg.chain import Chain, History, build_chain
 from atg_fg.errors import ImpossibleEvidenceError, InvalidInputError
+from atg_fg.imagined import ImaginedBelief, TableBelief
 from atg_fg.memory import RobotMemory
 from atg_fg.model import RecognitionModel, Revelation
 from atg_fg.parameters import ModelParameters
@@ -91,6 +92,17 @@ class Inference(ABC):
         """
         self._check_looked("shown patterns")
         return shown_patterns_of(self.model, self.aspect_belief, self.history.evidence[-1])
+
+    def imagined(self) -> ImaginedBelief:
+        """Return the present belief as one to imagine actions and looks from; the trial is not changed by them.
+
+        An engine that does not predict by the model's tables overrides this.
+
+        Raises:
+            InvalidInputError: Asked before a look or between an action and its look.
+        """
+        self._check_looked("imagined")
+        return TableBelief(self.model, self.aspect_belief)
 
     def chain(self, hypothesis: int | None = None) -> Chain:
         """Return the trial so far as plain arrays, for all hypotheses or under one of them."""

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from functools import partial
 from typing import Final
 
 from atg_fg.errors import unknown_name
 from atg_fg.policies.base import Choice, Policy, best_actions
 from atg_fg.policies.exploration import ExplorationPolicy
 from atg_fg.policies.goal import GoalPolicy
+from atg_fg.policies.lookahead import LookaheadPolicy
 from atg_fg.policies.recognition import EntropyPolicy, RandomPolicy
+from atg_fg.policies.stopping import StoppingPolicy, check_settled
 
 __all__ = [
     "POLICIES",
@@ -16,20 +20,37 @@ __all__ = [
     "EntropyPolicy",
     "ExplorationPolicy",
     "GoalPolicy",
+    "LookaheadPolicy",
     "Policy",
     "RandomPolicy",
+    "StoppingPolicy",
     "best_actions",
+    "check_settled",
     "make_policy",
 ]
 
 #: Policies that need nothing but the belief; ``GoalPolicy`` needs a goal, too.
-POLICIES: Final[dict[str, type[Policy]]] = {
-    policy.name: policy for policy in (EntropyPolicy, RandomPolicy, ExplorationPolicy)
+POLICIES: Final[dict[str, Callable[[], Policy]]] = {
+    EntropyPolicy.name: EntropyPolicy,
+    "lookahead-2": partial(LookaheadPolicy, 2),
+    "lookahead-3": partial(LookaheadPolicy, 3, least_weight=1e-2),
+    RandomPolicy.name: RandomPolicy,
+    ExplorationPolicy.name: ExplorationPolicy,
 }
 
 
-def make_policy(name: str) -> Policy:
-    """Return the policy named ``name``, or raise ``UnknownNameError``."""
+def make_policy(name: str, settled: float | None = None) -> Policy:
+    """Return the policy named ``name``.
+
+    Args:
+        name: In ``POLICIES``.
+        settled: Entropy of the verdict in nats at which the policy ends the trial; it never does if not given.
+
+    Raises:
+        UnknownNameError: There is no such policy.
+        InvalidInputError: ``settled`` is not a finite entropy above 0.
+    """
     if name not in POLICIES:
         raise unknown_name("policy", name, POLICIES)
-    return POLICIES[name]()
+    policy = POLICIES[name]()
+    return policy if settled is None else StoppingPolicy(policy, settled)
