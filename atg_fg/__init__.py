@@ -17,7 +17,7 @@ from atg_fg.object_worlds import ObjectWorld
 from atg_fg.objects import FiniteObject, Mechanism, ObjectFamily
 from atg_fg.parameters import ModelParameters
 from atg_fg.patterns import Evidence, PatternAlphabet
-from atg_fg.policies import POLICIES, GoalPolicy, make_policy
+from atg_fg.policies import POLICIES, GoalPolicy, LookaheadPolicy, StoppingPolicy, make_policy
 from atg_fg.presets import PRESETS, preset
 from atg_fg.recognition import RecognitionGraph
 from atg_fg.store import load_memory, save_memory
@@ -44,6 +44,7 @@ __all__ = [
     "IdentityBelief",
     "Inference",
     "JointRecognitionGraph",
+    "LookaheadPolicy",
     "Mechanism",
     "ModelParameters",
     "ObjectFamily",
@@ -52,6 +53,7 @@ __all__ = [
     "RecognitionGraph",
     "RobotMemory",
     "SharedStructure",
+    "StoppingPolicy",
     "StructuredMemory",
     "TestPlan",
     "TestResult",

@@ -31,7 +31,7 @@ POLICIES = ("entropy", "lookahead-2", "lookahead-3")
 N_OBJECTS = 100
 N_TRIALS = 6
 N_LOOKS = 6
-ACTIONS = (3, 4, 6, 8)
+ACTIONS = (4, 6, 10)
 
 
 def looks() -> Iterator[tuple[int, Inference]]:

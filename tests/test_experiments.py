@@ -7,12 +7,13 @@ import numpy as np
 import pytest
 
 from atg_fg.errors import InvalidInputError, UnknownNameError
-from atg_fg.experiments import TestPlan, TestResult, figure3_points, run_test, run_tests, summarise
+from atg_fg.experiments import TestPlan, TestResult, actions_a_trial, figure3_points, run_test, run_tests, summarise
 from atg_fg.object_worlds import ObjectWorld
 from atg_fg.objects import FiniteObject, Mechanism, ObjectFamily
 from atg_fg.parameters import ModelParameters
 from atg_fg.patterns import PatternAlphabet
 from atg_fg.presets import preset
+from atg_fg.statistics import Z_95
 from atg_fg.trial_log import read_trials
 
 QUICK = TestPlan(engine="bayes-filter", n_trials=30, n_actions=6)
@@ -224,3 +225,40 @@ def test_records_of_presets_without_structure_keep_their_header(tmp_path):
         "observation_noise": 1e-8,
         "learn_in_trial": False,
     }
+
+
+class TestSettled:
+    PLAN = replace(QUICK, settled=0.05, n_actions=12)
+
+    def test_trials_that_end_early_are_scored_and_learned_from_like_any_other(self):
+        records = []
+        result = run_test(self.PLAN, 0, on_trial=lambda _, record: records.append(record))
+        assert result.actions == tuple(len(record.actions) for record in records)
+        assert min(result.actions) < 12 == max(result.actions)
+        assert result.identification[1] == result.success[1] == len(records) == 30
+        assert [record.names for record in records[:2]] == [(), ("object-000",)]
+
+    def test_it_is_the_same_after_an_interruption(self, tmp_path):
+        whole = run_test(self.PLAN, 1, tmp_path)
+        assert run_test(self.PLAN, 1, tmp_path, True) == whole == run_test(self.PLAN, 1)
+        trials = read_trials(tmp_path / "test-0001.jsonl.gz")
+        assert tuple(len(trial["actions"]) for trial in trials) == whole.actions
+        assert trials[0]["purpose"] == ["settled"]
+
+    def test_records_of_trials_that_do_not_stop_are_of_another_test(self, tmp_path):
+        run_test(replace(self.PLAN, n_trials=2, settled=None), 0, tmp_path)
+        with pytest.raises(InvalidInputError, match="expected the trials of"):
+            run_test(replace(self.PLAN, n_trials=2), 0, tmp_path, True)
+
+    def test_the_mean_number_of_actions_counts_every_trial(self):
+        results = [TestResult(seed, (0, 2), (0, 0), (0, 2), actions=(seed, 4)) for seed in (0, 2)]
+        number = actions_a_trial(results)
+        assert number["mean"] == 2.5
+        # s² = 11/3 over 4 trials
+        assert number["interval95"] == pytest.approx([2.5 - Z_95 * (11 / 12) ** 0.5, 2.5 + Z_95 * (11 / 12) ** 0.5])
+        assert actions_a_trial([TestResult(0, (0, 1), (0, 0), (0, 1), actions=(3,))])["interval95"] is None
+
+    @pytest.mark.parametrize("settled", [0.0, float("nan")])
+    def test_an_entropy_that_means_nothing_is_refused(self, settled):
+        with pytest.raises(InvalidInputError, match=f"settled: {settled}; expected"):
+            TestPlan(settled=settled)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from atg_fg.assumptions import Assumptions
+from atg_fg.expected_entropy import edge_arrivals
 from atg_fg.memory import RobotMemory
 from atg_fg.model import COLLECTION, RecognitionModel
 from atg_fg.parameters import ModelParameters
@@ -155,3 +156,16 @@ def test_the_memory_is_not_changed_by_learning_within_the_trial() -> None:
     model.learn(None, None, 0)
     model.learn(0, 0, 5)
     assert memory == two_slot_memory()
+
+
+def test_restricted_tables_are_those_of_the_hypotheses_that_are_left() -> None:
+    assumptions = one_slot(5, 3, 4, ("push", "pull"))
+    graphs = [graph(assumptions, str(i), [(i,), (3,)], (0, i % 2, 1, 1 + i), (1, 0, 0, 2)) for i in range(3)]
+    model = RecognitionModel(RobotMemory(assumptions, graphs), ModelParameters(0.5, 0.1))
+    part = model.restricted(np.array([0, 2, 3]))
+    for action in range(2):
+        table_is(part.transition(action), model.transition(action)[[0, 2, 3]])
+    evidence = seen(assumptions, 3)
+    table_is(part.likelihood(evidence), model.likelihood(evidence)[[0, 2, 3]])
+    mass = part.prior[:, None] * part.base
+    table_is(edge_arrivals(part, mass), edge_arrivals(model, model.prior[:, None] * model.base)[:, [0, 2, 3]])

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from atg_fg.errors import InvalidInputError
-from atg_fg.statistics import mean, standard_error, wilson_interval
+from atg_fg.statistics import Z_95, mean, mean_interval, standard_error, wilson_interval
 
 
 def test_the_interval_of_the_papers_success_rate_is_the_published_one():
@@ -35,3 +35,10 @@ def test_mean_and_its_standard_error_by_hand():
     assert mean([]) is None
     assert math.isclose(standard_error([1.0, 2.0, 6.0]), math.sqrt((4 + 1 + 9) / 2 / 3))
     assert standard_error([1.0]) is None
+
+
+def test_the_interval_of_a_mean_is_as_wide_as_its_standard_error_says():
+    low, high = mean_interval([1.0, 2.0, 3.0])
+    assert (low, high) == pytest.approx((2 - Z_95 / math.sqrt(3), 2 + Z_95 / math.sqrt(3)))
+    assert mean_interval([1.0]) is None
+    assert mean_interval([]) is None

@@ -98,7 +98,7 @@ def test_other_numbers_of_actions_are_refused(text):
         (["--world", "magic"], "world: unknown name 'magic'; expected one of: half-and-half, ideal, lid-box"),
         (["--world", "nowhere:some/World-v0"], "world 'nowhere:some/World-v0': cannot be made"),
         (["--preset", "magic"], "preset: unknown name 'magic'; expected one of: default, learned, paper"),
-        (["--policy", "magic"], "policy: unknown name 'magic'; expected one of: entropy, explore, random"),
+        (["--policy", "magic"], "policy: unknown name 'magic'; expected one of: entropy, explore, lookahead-2"),
         (["--actions", "0"], "--actions: 0; expected a whole number of at least 1"),
         (["--tests", "-1"], "--tests: -1; expected a whole number of at least 1"),
         (["--jobs", "0"], "--jobs: 0; expected"),
@@ -127,3 +127,23 @@ def test_the_preset_learned_chooses_its_engine(run, refused):
     assert json.loads(output)["parameters"]["engine"] == "learned-structure"
     assert "engine 'gtsam': does not know learn_structure" in refused("table1", *quick, "--engine", "gtsam")
     assert json.loads(run("table1", *QUICK[2:], "--tests", "1", "--json", "-")[1])["parameters"]["engine"] == "gtsam"
+
+
+def test_table1_says_how_many_actions_settled_trials_took(run):
+    arguments = ["table1", *QUICK, "--tests", "2", "--actions", "12", "--settled", "0.1"]
+    document = json.loads(run(*arguments, "--json", "-")[1])
+    assert document["parameters"]["settled"] == 0.1
+    low, high = document["actions_a_trial"]["interval95"]
+    assert low <= document["actions_a_trial"]["mean"] <= high <= 12
+    assert "actions a trial" in run(*arguments)[1]
+
+
+def test_table1_without_settled_says_nothing_of_it(run):
+    document = json.loads(run("table1", *QUICK, "--tests", "1", "--json", "-")[1])
+    assert "actions_a_trial" not in document
+    assert "settled" not in document["parameters"]
+
+
+@pytest.mark.parametrize("command", ["table1", "trial"])
+def test_an_entropy_that_settles_nothing_is_refused(refused, command):
+    assert "--settled: 0.0; expected a finite entropy above 0 nats" in refused(command, "--settled", "0")

@@ -77,6 +77,12 @@ def test_a_trial_learns_and_the_next_one_recognises(run, tmp_path):
     assert document["matched"] == document["learned"] == "object-000"
 
 
+def test_a_trial_ends_when_it_is_settled(run):
+    document = json.loads(run("trial", "--engine", "bayes-filter", "--settled", "0.1", "--json", "-")[1])
+    assert document["parameters"]["settled"] == 0.1
+    assert [step["purpose"] for step in document["steps"]] == ["settled"]
+
+
 def test_a_trial_refuses_what_it_could_not_save(refused, tmp_path):
     assert "cannot be written" in refused("trial", "--record", tmp_path / "no" / "record.jsonl")
     assert "cannot be read" in refused("trial", "--memory", tmp_path / "absent.json")
