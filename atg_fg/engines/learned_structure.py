@@ -13,17 +13,18 @@ import numpy as np
 
 from atg_fg.belief import IdentityBelief, log_of, log_sum_exp
 from atg_fg.engines.bayes_filter import BayesFilter, forward_backward
-from atg_fg.expected_entropy import expected_entropies_of_table, next_pattern_joint, pattern_table
+from atg_fg.imagined import ImaginedBelief
 from atg_fg.memory import RobotMemory
 from atg_fg.model import COLLECTION
 from atg_fg.parameters import ModelParameters
 from atg_fg.patterns import Evidence, FloatArray
 from atg_fg.situations import LEAST_PROBABILITY, Situation, shown_patterns_of, situations_of
 from atg_fg.structure.completion import pose_graph
+from atg_fg.structure.imagined import Following, StructureBelief
 from atg_fg.structure.learner import BelievedStructure
 from atg_fg.structure.memory import StructuredMemory
 from atg_fg.structure.pose_chain import pose_chain, pose_patterns
-from atg_fg.structure.pose_filter import UNIMPORTANT, PoseFilter
+from atg_fg.structure.pose_filter import PoseFilter
 from atg_fg.structure.rates import Rates
 
 #: A structure less probable than this, given the trial so far, is left out of the rest of it.
@@ -141,23 +142,23 @@ class LearnedStructure(BayesFilter):
             shown += belief[owners] @ patterns
         return shown
 
+    def imagined(self) -> ImaginedBelief:
+        """Return the present belief as one to imagine actions and looks from; the trial is not changed by them.
+
+        Raises:
+            InvalidInputError: Asked before a look or between an action and its look.
+        """
+        if not self._followed:
+            return super().imagined()
+        self._check_looked("imagined")
+        beliefs = self._type_beliefs()
+        following = [Following(each.filter, belief) for each, belief in zip(self._followed, beliefs[1:], strict=True)]
+        plain = beliefs[0][:, None] * self._belief.aspects
+        return StructureBelief(self.model, plain, following, self.memory.assumptions.alphabet.symbols)
+
     def _expected_entropies(self) -> FloatArray:
         """Return eq. 3 for each action, shape [A], from p(O, z | a) summed over types, poses and contents."""
-        if not self._followed:
-            return super()._expected_entropies()
-        beliefs = self._type_beliefs()
-        identity = sum(beliefs, np.zeros(self.model.n_hypotheses))
-        unseen = self.model.n_hypotheses - 1
-        matters = np.union1d(np.flatnonzero(identity > UNIMPORTANT), unseen)
-        table = np.zeros((self.model.n_actions, len(matters), self.model.n_patterns))
-        if beliefs[0].sum() > UNIMPORTANT:
-            joint = next_pattern_joint(self.model, beliefs[0][:, None] * self._belief.aspects)
-            table += pattern_table(self.model, joint, matters)
-        for each, belief in zip(self._followed, beliefs[1:], strict=True):
-            owners, patterns = each.filter.predicted_patterns()
-            common, places, own = np.intersect1d(matters, owners, assume_unique=True, return_indices=True)
-            table[:, places] += belief[common, None] * patterns[:, own]
-        return expected_entropies_of_table(table, float(identity[unseen]), self.model.n_unseen)
+        return self.imagined().expected_entropies() if self._followed else super()._expected_entropies()
 
     def _smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
         """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s, of plain ATGs and poses together.

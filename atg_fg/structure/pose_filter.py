@@ -9,6 +9,7 @@ a new one that never slips, never has two rows in one pose, and is filtered exac
 
 from __future__ import annotations
 
+import copy
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -85,6 +86,13 @@ class PoseFilter:
         self._contents = contents
         self._shown = soft.symbol_probabilities(contents, rates.repeat)
         self.log_evidence = np.zeros(n_owners)
+
+    def copy(self) -> PoseFilter:
+        """Return a filter that goes on alone from here."""
+        twin = copy.copy(self)
+        # All else is replaced at each step rather than changed.
+        twin.log_evidence = self.log_evidence.copy()
+        return twin
 
     def act(self, action: int) -> None:
         """Take in an action."""
