@@ -33,6 +33,7 @@ __all__ = [
 POLICIES: Final[dict[str, Callable[[], Policy]]] = {
     EntropyPolicy.name: EntropyPolicy,
     "lookahead-2": partial(LookaheadPolicy, 2),
+    "lookahead-2-pruned": partial(LookaheadPolicy, 2, least_weight=1e-2),
     "lookahead-3": partial(LookaheadPolicy, 3, least_weight=1e-2),
     RandomPolicy.name: RandomPolicy,
     ExplorationPolicy.name: ExplorationPolicy,
