@@ -132,6 +132,44 @@ def plot_success(points: Sequence[Mapping[str, Any]], *, title: str = "Success r
     return figure
 
 
+def plot_ablation(entries: Sequence[Mapping[str, Any]]) -> Figure:
+    """Plot the success rate of each variant over the actions per trial, a panel for each world and noise.
+
+    Args:
+        entries: Mappings with "world", "noise", "variant", "actions", "success" and "interval95", as
+            ``summarise_ablation`` returns them.
+
+    Raises:
+        InvalidInputError: No entries.
+        MissingDependencyError: matplotlib is not installed.
+    """
+    if not entries:
+        raise InvalidInputError("ablation plot: no entries; expected at least one")
+    panels = list(dict.fromkeys((entry["world"], entry["noise"]) for entry in entries))
+    variants = list(dict.fromkeys(entry["variant"] for entry in entries))
+    n_columns = min(2, len(panels))
+    n_rows = -(-len(panels) // n_columns)
+    with plot_style():
+        figure = figure_class()(figsize=(4.6 * n_columns, 3.2 * n_rows), layout="constrained")
+        all_axes = figure.subplots(n_rows, n_columns, sharex=True, sharey=True, squeeze=False).ravel()
+        for axes, (world, noise) in zip(all_axes, panels, strict=False):
+            for rank, variant in enumerate(variants):
+                where = {"world": world, "noise": noise, "variant": variant}
+                curve = [entry for entry in entries if where.items() <= dict(entry).items()]
+                if curve:
+                    points = np.array([[each["actions"], each["success"], *each["interval95"]] for each in curve])
+                    points = points[np.argsort(points[:, 0])]
+                    _plot_curve(axes, points * [1, 100, 100, 100], PALETTE[rank % len(PALETTE)], "os^Dvp"[rank % 6])
+            axes.set_title(noise if len({world for world, _ in panels}) == 1 else f"{world}, {noise}", parse_math=False)
+            axes.set(ylim=(0, 101), xlabel="actions per trial", ylabel="success rate (%)")
+            axes.label_outer()
+        for axes in all_axes[len(panels) :]:
+            axes.remove()
+        lines = [line for line in all_axes[0].get_lines() if line.get_marker() not in ("", "None", None)]
+        figure.legend(lines, variants, loc="outside lower center", ncols=len(variants))
+    return figure
+
+
 def _figure_with_axes(width: float, height: float) -> tuple[Figure, Axes]:
     """Return a figure of this size in inches and its only axes."""
     figure = figure_class()(figsize=(width, height), layout="constrained")

@@ -8,7 +8,7 @@ from importlib.metadata import entry_points
 import typer
 import typer.exceptions
 
-from atg_fg.cli import demo, engines, experiments, explain, goal, memory, trials, uai
+from atg_fg.cli import ablation, demo, engines, experiments, explain, goal, memory, trials, uai
 from atg_fg.errors import AtgError
 
 app = typer.Typer(
@@ -21,6 +21,7 @@ app = typer.Typer(
 app.command()(demo.demo)
 app.command()(experiments.table1)
 app.command()(experiments.figure3)
+app.command()(ablation.ablation)
 app.command()(goal.goal)
 app.command()(trials.trial)
 app.command()(trials.replay)

@@ -48,6 +48,7 @@ def test_the_random_policy_takes_every_action_as_often():
 
 def test_an_unknown_policy_is_refused():
     with pytest.raises(
-        UnknownNameError, match="'greedy'; expected one of: entropy, explore, lookahead-2, lookahead-3, random"
+        UnknownNameError,
+        match="'greedy'; expected one of: entropy, explore, lookahead-2, lookahead-2-pruned, lookahead-3, random",
     ):
         make_policy("greedy")

@@ -1,0 +1,197 @@
+"""The ablation: what each part of the model adds, by number of actions and by noise, each test logged as it ends."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Final
+
+from atg_fg.engines.learned_structure import LearnedStructure
+from atg_fg.errors import InvalidInputError
+from atg_fg.experiments import TestPlan, TestResult, pooled_interval, run_tests
+from atg_fg.presets import preset
+from atg_fg.statistics import mean, standard_error
+from atg_fg.store import write_bytes_atomically
+
+
+@dataclass(frozen=True)
+class Variant:
+    """A way to recognise.
+
+    Attributes:
+        preset: Name of the parameters.
+        policy: Name of the policy.
+    """
+
+    preset: str
+    policy: str = "entropy"
+
+
+#: What is compared, by name: each adds to the one before.
+VARIANTS: Final[dict[str, Variant]] = {
+    "paper": Variant("paper"),
+    "default": Variant("default"),
+    "learned": Variant("learned"),
+    "learned, lookahead": Variant("learned", "lookahead-2-pruned"),
+}
+
+#: Options of the world, by name.
+NOISES: Final[dict[str, dict[str, float]]] = {
+    "ideal": {},
+    "2% slip, 0.5% wrong": {"slip": 0.02, "wrong": 0.005},
+    "5% slip, 1% wrong": {"slip": 0.05, "wrong": 0.01},
+    "10% missing": {"missing": 0.10},
+}
+
+
+@dataclass(frozen=True)
+class Cell:
+    """One entry of the table, of several tests.
+
+    Attributes:
+        variant: Name in ``VARIANTS``.
+        world: Name of the world.
+        noise: Name in ``NOISES``.
+        actions: Actions a trial.
+    """
+
+    variant: str
+    world: str
+    noise: str
+    actions: int
+
+    def plan(self, n_trials: int) -> TestPlan:
+        """Return the plan of each test."""
+        variant = VARIANTS[self.variant]
+        parameters = preset(variant.preset)
+        return TestPlan(
+            world=self.world,
+            world_options=dict(NOISES[self.noise]),
+            engine=LearnedStructure.name if parameters.learn_structure else "bayes-filter",
+            policy=variant.policy,
+            parameters=parameters,
+            n_actions=self.actions,
+            n_trials=n_trials,
+        )
+
+
+class AblationLog:
+    """Tests that have been run, a JSON line each, in a file that grows.
+
+    Args:
+        path: The file, ``….jsonl``.
+        n_trials: Trials a test; a file with others is refused.
+
+    Raises:
+        InvalidInputError: The file cannot be read, or is of other tests.
+    """
+
+    def __init__(self, path: Path, n_trials: int) -> None:
+        self.path = path
+        self._header = {"format": "atg-fg/ablation", "version": 1, "trials": n_trials}
+        self._results: dict[tuple[Cell, int], TestResult] = {}
+        if path.exists():
+            self._read()
+        else:
+            write_bytes_atomically(path, _line(self._header))
+
+    def get(self, cell: Cell, seed: int) -> TestResult | None:
+        """Return the result of a test, ``None`` if it was not run yet."""
+        return self._results.get((cell, seed))
+
+    def add(self, cell: Cell, result: TestResult) -> None:
+        """Add the result of a test."""
+        self._results[cell, result.seed] = result
+        scores = {name: getattr(result, name) for name in ("identification", "recognition", "success")}
+        with self.path.open("ab") as file:
+            file.write(_line({**asdict(cell), "seed": result.seed, **scores}))
+
+    def _read(self) -> None:
+        try:
+            content = self.path.read_bytes()
+            sound = content[: content.rfind(b"\n") + 1]  # a writer that was cut off leaves at most half a line
+            header, *lines = [json.loads(line) for line in sound.splitlines()]
+            if header != self._header:
+                raise ValueError(f"holds {json.dumps(header)}, not {json.dumps(self._header)}")
+            for line in lines:
+                self._take(line)
+        except (OSError, ValueError, KeyError, TypeError) as error:
+            raise InvalidInputError(f"{self.path}: {error}; expected the log of an ablation with such tests") from error
+        if len(sound) < len(content):
+            write_bytes_atomically(self.path, sound)
+
+    def _take(self, line: dict[str, Any]) -> None:
+        cell = Cell(line["variant"], line["world"], line["noise"], int(line["actions"]))
+        identification, recognition, success = (
+            (int(line[name][0]), int(line[name][1])) for name in ("identification", "recognition", "success")
+        )
+        result = TestResult(int(line["seed"]), identification, recognition, success)
+        self._results[cell, result.seed] = result
+
+
+def _line(entry: dict[str, Any]) -> bytes:
+    return (json.dumps(entry) + "\n").encode()
+
+
+def run_ablation(
+    cells: Sequence[Cell],
+    seeds: Sequence[int],
+    n_trials: int,
+    log: AblationLog | None = None,
+    jobs: int = 1,
+    on_test: Callable[[], None] | None = None,
+) -> dict[Cell, list[TestResult]]:
+    """Run every cell with every seed, but for what the log holds, and return the results in the order of ``cells``.
+
+    The results are the same for any number of jobs, and after any interruption.
+
+    Args:
+        cells: What is to be run.
+        seeds: Of the tests of each cell; the same for all, so that differences can be paired.
+        n_trials: Trials a test.
+        log: Where each test is kept as it ends.
+        jobs: Processes.
+        on_test: Called after each test that is run.
+    """
+    done = {(cell, seed): log.get(cell, seed) if log else None for cell in cells for seed in seeds}
+    # Short tests first, so that what is quick is there early.
+    missing = sorted((key for key, result in done.items() if result is None), key=lambda key: (key[0].actions, key[1]))
+    plans = [(cell.plan(n_trials), seed) for cell, seed in missing]
+    if plans:
+        for key, result in zip(missing, run_tests(plans, jobs), strict=True):
+            done[key] = result
+            if log is not None:
+                log.add(key[0], result)
+            if on_test is not None:
+                on_test()
+    results = {key: result for key, result in done.items() if result is not None}
+    return {cell: [results[cell, seed] for seed in seeds] for cell in cells}
+
+
+def summarise_ablation(results: dict[Cell, list[TestResult]], reference: str = "default") -> list[dict[str, Any]]:
+    """Return the success of each cell with its interval, and its paired difference to ``reference`` if that was run."""
+    return [
+        {
+            **asdict(cell),
+            "tests": len(tests),
+            "success": mean(_rates(tests)),
+            "interval95": list(pooled_interval(tests, "success")),
+            "standard_error": standard_error(_rates(tests)),
+            "above_reference": _paired(tests, results.get(Cell(reference, cell.world, cell.noise, cell.actions))),
+        }
+        for cell, tests in results.items()
+    ]
+
+
+def _rates(tests: Iterable[TestResult]) -> list[float]:
+    return [test.success[0] / test.success[1] for test in tests]
+
+
+def _paired(tests: Sequence[TestResult], reference: Sequence[TestResult] | None) -> dict[str, float | None] | None:
+    """Return the mean difference of success to the same seeds of the reference, with its standard error."""
+    if reference is None or reference is tests:
+        return None
+    differences = [ours - theirs for ours, theirs in zip(_rates(tests), _rates(reference), strict=True)]
+    return {"mean": mean(differences), "standard_error": standard_error(differences)}

@@ -1,0 +1,106 @@
+"""``atg-fg ablation``: what each part of the model adds."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.table import Table
+
+from atg_fg import ablation as experiment
+from atg_fg import figures, store
+from atg_fg.ablation import NOISES, VARIANTS, AblationLog, Cell
+from atg_fg.cli import options
+from atg_fg.cli.experiments import parse_actions
+from atg_fg.errors import InvalidInputError, unknown_name
+from atg_fg.plots import plot_ablation
+from atg_fg.worlds import WORLDS
+
+
+def ablation(
+    variants: Annotated[
+        str, typer.Option(help=f"all, or some of: {'; '.join(VARIANTS)} (with ; between them).")
+    ] = "all",
+    actions: Annotated[str, typer.Option(help="Numbers of actions, first:last or a list.")] = "3,4,6,8,10,14,20",
+    noises: Annotated[str, typer.Option(help=f"all, or some of: {'; '.join(NOISES)} (with ; between them).")] = "all",
+    worlds: Annotated[str, typer.Option(help=f"Some of: {', '.join(WORLDS)}.")] = "ideal",
+    tests: options.Tests = 10,
+    trials: options.Trials = 100,
+    seed: options.Seed = 0,
+    jobs: options.Jobs = None,
+    log: Annotated[
+        Path | None, typer.Option(help="Keep each test in this .jsonl file as it ends, and leave out those in it.")
+    ] = None,
+    json_file: options.JsonFile = None,
+    plot: Annotated[Path | None, typer.Option(help="Draw the curves into this .png, .svg or .pdf file.")] = None,
+) -> None:
+    """Compare the literal model, learning within the trial, learned structure and lookahead, with and without noise.
+
+    Example: atg-fg ablation --actions 4,10 --noises ideal --tests 2 --log ablation.jsonl
+    """
+    options.check_at_least(1, tests=tests, trials=trials, jobs=jobs)
+    options.check_at_least(0, seed=seed)
+    options.check_json_option(json_file)
+    if plot is not None:
+        figures.check_figure_path(plot)
+    cells = [
+        Cell(variant, world, noise, number)
+        for world in _chosen("--worlds", worlds, tuple(WORLDS), ",")
+        for noise in _chosen("--noises", noises, tuple(NOISES), ";")
+        for variant in _chosen("--variants", variants, tuple(VARIANTS), ";")
+        for number in parse_actions(actions)
+    ]
+    kept = None
+    if log is not None:
+        store.check_writable(log)
+        kept = AblationLog(log, trials)
+    with options.progress_bar("tests", len(cells) * tests) as advance:
+        seeds = range(seed, seed + tests)
+        results = experiment.run_ablation(cells, seeds, trials, kept, jobs or options.available_cpus(), advance)
+    entries = experiment.summarise_ablation(results)
+    parameters = {"tests": tests, "trials": trials, "seed": seed}
+    options.write_json({"command": "ablation", "parameters": parameters, "cells": entries}, json_file)
+    if plot is not None:
+        figures.save_figure(plot_ablation(entries), plot)
+    if json_file != "-":
+        for world, noise in dict.fromkeys((entry["world"], entry["noise"]) for entry in entries):
+            chosen = [entry for entry in entries if (entry["world"], entry["noise"]) == (world, noise)]
+            options.console().print(
+                _table(f"Success, {world} world, {noise}, {tests} tests of {trials} trials", chosen)
+            )
+
+
+def _chosen(option: str, text: str, known: tuple[str, ...], separator: str) -> list[str]:
+    """Return the names in an option's text, or all that there are.
+
+    Raises:
+        UnknownNameError: A name that is not there.
+        InvalidInputError: A name twice.
+    """
+    if text == "all":
+        return list(known)
+    names = [name.strip() for name in text.split(separator)]
+    for name in names:
+        if name not in known:
+            raise unknown_name(option, name, known)
+    if len(set(names)) < len(names):
+        raise InvalidInputError(f"{option}: {text!r}; expected each name once")
+    return names
+
+
+def _table(title: str, entries: list[dict[str, Any]]) -> Table:
+    table = Table(title=title, title_justify="left")
+    table.add_column("Actions", justify="right")
+    variants = list(dict.fromkeys(entry["variant"] for entry in entries))
+    for variant in variants:
+        table.add_column(variant, justify="right")
+    cells = {(entry["actions"], entry["variant"]): entry for entry in entries}
+    for number in dict.fromkeys(entry["actions"] for entry in entries):
+        table.add_row(str(number), *(_with_interval(cells[number, variant]) for variant in variants))
+    return table
+
+
+def _with_interval(entry: dict[str, Any]) -> str:
+    low, high = entry["interval95"]
+    return f"{100 * entry['success']:.1f}% ({100 * low:.1f}-{100 * high:.1f})"
