@@ -27,8 +27,6 @@ from atg_fg.structure.trials import RawTrial
 DENSE_MILESTONES: Final = 8
 #: A structure is settled if it is this many nats better than none.
 SETTLED_GAIN: Final = 50.0
-#: … and explains this share of all trials; else more is searched for, but only when the trials have doubled.
-SETTLED_SHARE: Final = 0.9
 #: A structure that takes this share of looks and symbols for errors is in doubt, however much it explains.
 DOUBTFUL_ERRORS: Final = 0.02
 #: Structures that are believed in at once, and how many nats the others may be behind the best.
@@ -103,11 +101,12 @@ class StructureLearner:
         self._append(owner, trial)
         for candidate in self._candidates:
             candidate.extend(trial, self._owner_indices[-1], self.rates)
+        self._candidates = self._worth_keeping()
         if is_milestone(len(self.trials)):
             if self._is_worth_a_search():
                 self._search()
             self._estimate_rates()
-        self._candidates = self._worth_keeping()
+            self._candidates = self._worth_keeping()
 
     def restore(
         self, owners: Sequence[str], trials: Sequence[RawTrial], structures: Sequence[SharedStructure], rates: Rates
@@ -166,13 +165,15 @@ class StructureLearner:
         self._plain.append(plain_log_evidence(trial, self.assumptions))
 
     def _is_worth_a_search(self) -> bool:
-        """Return whether there may be a structure that explains more than those at hand."""
-        if self.gain < SETTLED_GAIN or self.rates.wrong + self.rates.repeat > DOUBTFUL_ERRORS:
-            return True
-        explained = self._candidates[0].responsibilities(np.array(self._plain)).mean()
+        """Return whether there may be a structure that explains more than those at hand.
+
+        While none is settled this is so at each milestone, then whenever the trials have doubled: another structure may
+        explain as much at first, or the rest of the trials.
+        """
         n_trials = len(self.trials)
         has_doubled = n_trials.bit_length() > (n_trials * 4 // 5).bit_length()  # at every third milestone or so
-        return bool(explained < SETTLED_SHARE) and has_doubled
+        in_doubt = self.rates.wrong + self.rates.repeat > DOUBTFUL_ERRORS
+        return self.gain < SETTLED_GAIN or in_doubt or has_doubled
 
     def _search(self) -> None:
         """Add what a search proposes to the candidates."""

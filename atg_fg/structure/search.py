@@ -33,7 +33,7 @@ class SearchPlan:
         n_steps: Moves of each chain.
         hottest: First temperature, in nats.
         coldest: Last temperature, in nats.
-        n_trials: Pieces of trials that are looked at, drawn at random if there are more.
+        n_looks: Looks in the pieces of trials that are looked at, drawn at random if there are more.
         n_actions: Actions in a piece: a slip spoils what comes after it, so long trials are cut.
     """
 
@@ -42,7 +42,7 @@ class SearchPlan:
     n_steps: int = 120
     hottest: float = 6.0
     coldest: float = 0.5
-    n_trials: int = 12
+    n_looks: int = 132
     n_actions: int = 10
 
 
@@ -77,16 +77,25 @@ def propose_structures(
         incumbents: Structures that chains of their size begin from, the first of a size each.
     """
     plan = plan or SearchPlan()
-    pieces = [piece for trial in trials for piece in trial.pieces(plan.n_actions)]
+    pieces = _drawn_pieces(trials, rng, plan)
     if not pieces:
         return Proposals((), 0)
-    if len(pieces) > plan.n_trials:
-        pieces = [pieces[index] for index in np.sort(rng.choice(len(pieces), plan.n_trials, replace=False))]
     chains = _Chains(QuickScore(pieces, assumptions), assumptions, rng, plan, incumbents)
     for step in range(plan.n_steps):
         cooled = step / max(plan.n_steps - 1, 1)
         chains.move(plan.hottest * (plan.coldest / plan.hottest) ** cooled)
     return Proposals(chains.best_structures(), chains.n_evaluations)
+
+
+def _drawn_pieces(trials: Sequence[RawTrial], rng: np.random.Generator, plan: SearchPlan) -> list[RawTrial]:
+    """Return all pieces of trials, or a random choice of them that has about as many looks as planned."""
+    pieces = [piece for trial in trials for piece in trial.pieces(plan.n_actions)]
+    n_looks = np.array([len(piece.detections) for piece in pieces])
+    if n_looks.sum() <= plan.n_looks:
+        return pieces
+    order = rng.permutation(len(pieces))
+    n_drawn = max(int(np.searchsorted(np.cumsum(n_looks[order]), plan.n_looks, side="right")), 1)
+    return [pieces[index] for index in np.sort(order[:n_drawn])]
 
 
 class _Chains:
