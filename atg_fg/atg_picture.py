@@ -7,29 +7,21 @@ have not been tried and lead to the collection node in the middle.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Collection, Mapping
+from collections.abc import Collection
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
+from atg_fg.aspect_picture import INCHES_PER_UNIT, Images, action_color, draw_arrow, draw_aspect, draw_frame
 from atg_fg.errors import InvalidInputError
-from atg_fg.figures import GREY, INK, PALETTE, figure_class, plot_style
+from atg_fg.figures import GREY, figure_class, plot_style
 from atg_fg.graph import AspectTransitionGraph, Edge
-from atg_fg.patterns import FloatArray, Pattern
+from atg_fg.patterns import FloatArray
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-Images = Mapping[int, NDArray[np.uint8]]
-
-#: Slots that are drawn as two faces of a cube; others are drawn as tiles in a row.
-CUBE_SLOTS: Final = ("front", "top")
-#: How far the top of a cube is sheared to the right and up, as a part of its side.
-_SHEAR: Final = 0.42
-_HIGHLIGHT: Final = "#E69F00"
-_INCHES_PER_UNIT: Final = 0.78
 #: Half the width and height of the collection node's box.
 _COLLECTION_BOX: Final = np.array([1.05, 0.34])
 
@@ -61,7 +53,7 @@ def draw_atg(
     places, radius = _places(graph.n_known)
     extent = radius + 1.0
     with plot_style():
-        side = 2 * extent * _INCHES_PER_UNIT
+        side = 2 * extent * INCHES_PER_UNIT
         figure = figure_class()(figsize=(side, side + 0.6))
         axes = figure.add_axes((0, 0, 1, side / (side + 0.6)))
         axes.set(xlim=(-extent, extent), ylim=(-extent, extent), aspect="equal")
@@ -70,7 +62,9 @@ def draw_atg(
         _draw_observed(axes, graph, places, path)
         _draw_collection(axes, graph)
         for aspect, pattern in enumerate(graph.aspects):
-            _draw_aspect(axes, graph, pattern, places[aspect], symbol_images or {}, framed=aspect == highlight)
+            outline = draw_aspect(axes, graph.assumptions.alphabet.slots, pattern, places[aspect], symbol_images or {})
+            if aspect == highlight:
+                draw_frame(axes, outline)
         axes.set(xlim=(-extent, extent), ylim=(-extent, extent))  # images move the limits
         _draw_legend(figure, graph)
     return figure
@@ -83,37 +77,16 @@ def _places(n_aspects: int) -> tuple[FloatArray, float]:
     return radius * np.column_stack([np.cos(angles), np.sin(angles)]), radius
 
 
-def _color(action: int) -> str:
-    return PALETTE[action % len(PALETTE)]
-
-
-def _arrow(axes: Axes, start: FloatArray, end: FloatArray, bend: float, shrink: float, **style: Any) -> None:
-    from matplotlib.patches import FancyArrowPatch
-
-    points = 72 * _INCHES_PER_UNIT
-    patch = FancyArrowPatch(
-        tuple(start),
-        tuple(end),
-        connectionstyle=f"arc3,rad={bend}",
-        arrowstyle="-|>,head_length=5,head_width=2.5",
-        shrinkA=0.66 * points,
-        shrinkB=shrink * points,
-        zorder=1,
-        **style,
-    )
-    axes.add_patch(patch)
-
-
 def _draw_unknown(axes: Axes, graph: AspectTransitionGraph, places: FloatArray) -> None:
     """Draw a dotted arrow to the collection node for each action that was not tried."""
     if not graph.n_unobserved:
         return
     middle = (len(graph.assumptions.actions) - 1) / 2
     for aspect, action in graph.unknown_transitions():
-        style = {"linestyle": (0, (1, 2)), "color": _color(action), "linewidth": 1.1, "alpha": 0.75}
+        style = {"linestyle": (0, (1, 2)), "color": action_color(action), "linewidth": 1.1, "alpha": 0.75}
         # The arrow ends at the border of the node's box rather than in its middle.
         border = places[aspect] * (_COLLECTION_BOX / np.maximum(np.abs(places[aspect]), 1e-9)).min()
-        _arrow(axes, places[aspect], border, 0.13 * (action - middle), 0.05, **style)
+        draw_arrow(axes, places[aspect], border, 0.13 * (action - middle), 0.05, **style)
 
 
 def _draw_observed(axes: Axes, graph: AspectTransitionGraph, places: FloatArray, path: Collection[Edge]) -> None:
@@ -124,17 +97,17 @@ def _draw_observed(axes: Axes, graph: AspectTransitionGraph, places: FloatArray,
         between[source, target] += 1
         strength = _strength((source, action, target), path)
         if source == target:
-            label = _draw_loop(axes, places[source], number, color=_color(action), **strength)
+            label = _draw_loop(axes, places[source], number, color=action_color(action), **strength)
         else:
             # A straight way through the middle would be hidden by the collection node.
             through_middle = np.linalg.norm(places[source] + places[target]) < 1.0
             bend = 0.16 + 0.13 * number + 0.4 * bool(through_middle and graph.n_unobserved)
-            _arrow(axes, places[source], places[target], bend, 0.66, color=_color(action), **strength)
+            draw_arrow(axes, places[source], places[target], bend, 0.66, color=action_color(action), **strength)
             span = places[target] - places[source]
             label = (places[source] + places[target]) / 2 + bend / 2 * np.array([span[1], -span[0]])
         if count > 1:
             axes.annotate(
-                f"×{count}", tuple(label), ha="center", va="center", fontsize=7.5, color=_color(action),
+                f"×{count}", tuple(label), ha="center", va="center", fontsize=7.5, color=action_color(action),
                 bbox={"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none"}, zorder=2,
             )  # fmt: skip
 
@@ -170,84 +143,12 @@ def _draw_collection(axes: Axes, graph: AspectTransitionGraph) -> None:
     )  # fmt: skip
 
 
-def _draw_aspect(
-    axes: Axes, graph: AspectTransitionGraph, pattern: Pattern, place: FloatArray, images: Images, *, framed: bool
-) -> None:
-    slots = graph.assumptions.alphabet.slots
-    if slots == CUBE_SLOTS:
-        outline = _draw_cube(axes, pattern, place, images)
-    else:
-        outline = _draw_tiles(axes, pattern, slots, place, images)
-    if framed:
-        low, high = outline
-        from matplotlib.patches import FancyBboxPatch
-
-        width, height = (high - low).tolist()
-        style = f"round,pad={0.09},rounding_size=0.1"
-        axes.add_patch(
-            FancyBboxPatch(tuple(low), width, height, style, fill=False, edgecolor=_HIGHLIGHT, linewidth=3, zorder=6)
-        )
-
-
-def _draw_cube(axes: Axes, pattern: Pattern, place: FloatArray, images: Images) -> tuple[FloatArray, FloatArray]:
-    """Draw the front and the top of a cube with their symbols, and a blank side; return its outline."""
-    side = 0.78
-    low = place - side * (1 + _SHEAR) / 2
-    right, up, back = np.array([side, 0.0]), np.array([0.0, side]), np.full(2, side * _SHEAR)
-    front, top = pattern
-    _draw_face(axes, low + right, back, up, None, images, "#d8d8d8")
-    _draw_face(axes, low, right, up, front, images, "white")
-    _draw_face(axes, low + up, right, back, top, images, "white")
-    return low, low + right + up + back
-
-
-def _draw_tiles(
-    axes: Axes, pattern: Pattern, slots: tuple[str, ...], place: FloatArray, images: Images
-) -> tuple[FloatArray, FloatArray]:
-    """Draw one tile a slot in a row, with the slot's name above; return the outline."""
-    side = min(0.6, 1.3 / len(pattern))
-    low = place - np.array([side * len(pattern), side]) / 2
-    for number, (symbol, slot) in enumerate(zip(pattern, slots, strict=True)):
-        corner = low + np.array([number * side, 0.0])
-        _draw_face(axes, corner, np.array([side, 0.0]), np.array([0.0, side]), symbol, images, "white")
-        axes.annotate(slot, (corner[0] + side / 2, corner[1] + side + 0.05), ha="center", fontsize=6.5, color=GREY)
-    return low, low + np.array([side * len(pattern), side])
-
-
-def _draw_face(
-    axes: Axes,
-    corner: FloatArray,
-    right: FloatArray,
-    up: FloatArray,
-    symbol: int | None,
-    images: Images,
-    color: str,
-) -> None:
-    """Draw a parallelogram with its lower left ``corner``, and a symbol in the middle three quarters of it."""
-    from matplotlib.patches import Polygon
-    from matplotlib.transforms import Affine2D
-
-    outline = [corner, corner + right, corner + right + up, corner + up]
-    axes.add_patch(Polygon(outline, facecolor=color, edgecolor=INK, linewidth=0.9, zorder=4))
-    if symbol is None:
-        return
-    face_to_data = Affine2D(np.array([[right[0], up[0], corner[0]], [right[1], up[1], corner[1]], [0, 0, 1]]))
-    if symbol in images:
-        picture = axes.imshow(
-            images[symbol], cmap="gray", vmin=0, vmax=255, extent=(1 / 8, 7 / 8, 1 / 8, 7 / 8),
-            interpolation="nearest", zorder=5,
-        )  # fmt: skip
-        picture.set_transform(face_to_data + axes.transData)
-    else:
-        middle = corner + (right + up) / 2
-        axes.annotate(str(symbol), tuple(middle), ha="center", va="center", fontsize=11, zorder=5)
-
-
 def _draw_legend(figure: Figure, graph: AspectTransitionGraph) -> None:
     from matplotlib.lines import Line2D
 
     handles = [
-        Line2D([], [], color=_color(i), linewidth=2, label=name) for i, name in enumerate(graph.assumptions.actions)
+        Line2D([], [], color=action_color(i), linewidth=2, label=name)
+        for i, name in enumerate(graph.assumptions.actions)
     ]
     handles.append(Line2D([], [], color=GREY, linewidth=1.3, linestyle=(0, (1, 2)), label="not yet tried"))
     legend = figure.legend(handles=handles, loc="upper center", ncols=len(handles), title=graph.name, fontsize=9)

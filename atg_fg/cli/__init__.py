@@ -8,7 +8,7 @@ from importlib.metadata import entry_points
 import typer
 import typer.exceptions
 
-from atg_fg.cli import ablation, demo, engines, experiments, explain, goal, memory, trials, uai
+from atg_fg.cli import ablation, demo, engines, experiments, explain, goal, memory, structure, trials, uai
 from atg_fg.errors import AtgError
 
 app = typer.Typer(
@@ -29,6 +29,7 @@ app.command()(explain.explain)
 app.command()(engines.compare)
 app.command()(engines.calibrate)
 app.add_typer(memory.app, name="memory")
+app.add_typer(structure.app, name="structure")
 app.add_typer(uai.app, name="uai")
 # Packages beside this one, such as ``sim``, add groups of commands by an entry point.
 for group in entry_points(group="atg_fg.commands"):

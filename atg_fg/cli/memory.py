@@ -11,12 +11,14 @@ from rich.table import Table
 from atg_fg import store
 from atg_fg.cli import options
 from atg_fg.errors import InvalidInputError
-from atg_fg.export import to_dot, to_graphml
+from atg_fg.export import view_to_dot, view_to_graphml
+from atg_fg.structure.completion import completed_atg
+from atg_fg.structure.memory import StructuredMemory
 
 app = typer.Typer(help="Look at a saved robot memory, check it, export its graphs.", no_args_is_help=True)
 
 MemoryFile = Annotated[Path, typer.Argument(help="A memory file (JSON).", show_default=False)]
-EXPORTS = {"graphml": to_graphml, "dot": to_dot}
+EXPORTS = {"graphml": view_to_graphml, "dot": view_to_dot}
 
 
 @app.command()
@@ -73,6 +75,9 @@ def export(
     file: MemoryFile,
     name: Annotated[str | None, typer.Option(help="The ATG to export; the first one if not given.")] = None,
     format_name: Annotated[str, typer.Option("--format", help=f"One of: {', '.join(EXPORTS)}.")] = "graphml",
+    completed: Annotated[
+        bool, typer.Option("--completed", help="Add the aspects and transitions that the learned structure predicts.")
+    ] = False,
     output: Annotated[Path | None, typer.Option(help="File to write; standard output if not given.")] = None,
 ) -> None:
     """Export one ATG as GraphML or DOT.
@@ -84,7 +89,16 @@ def export(
     memory = store.load_memory(file)
     if not len(memory):
         raise InvalidInputError(f"{file}: the memory is empty; expected at least one ATG to export")
-    text = EXPORTS[format_name](memory[name if name is not None else memory.names[0]])
+    graph = memory[name if name is not None else memory.names[0]]
+    if not completed:
+        view = graph.to_networkx()
+    elif isinstance(memory, StructuredMemory):
+        view = completed_atg(memory, graph.name)
+    else:
+        raise InvalidInputError(
+            f"--completed: {file} has no learned structure; expected a memory of the preset learned"
+        )
+    text = EXPORTS[format_name](view, memory.assumptions.alphabet.slots)
     if output is None:
         typer.echo(text, nl=False)
     else:

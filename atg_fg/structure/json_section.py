@@ -22,6 +22,7 @@ def write_learner(learner: StructureLearner) -> dict[str, Any]:
     names = learner.assumptions.actions
     return {
         "seed": learner.seed,
+        "evaluations": learner.n_evaluations,
         "rates": learner.rates.to_json(),
         "candidates": [write_structure(structure, learner.assumptions) for structure in learner.candidates],
         "trials": [
@@ -47,8 +48,9 @@ def read_learner(value: Any, assumptions: Assumptions, names: Sequence[str], pla
     Raises:
         InvalidInputError: Anything malformed; the message names the place.
     """
-    fields = read_object(value, place, ("seed", "rates", "candidates", "trials"))
+    fields = read_object(value, place, ("seed", "rates", "candidates", "trials"), optional=("evaluations",))
     learner = StructureLearner(assumptions, read_integer(fields["seed"], f"{place}.seed", least=0))
+    learner.n_evaluations = read_integer(fields.get("evaluations", 0), f"{place}.evaluations", least=0)
     candidates = read_list(fields["candidates"], f"{place}.candidates")
     if len(candidates) > MAX_CANDIDATES:
         raise InvalidInputError(f"{place}.candidates: {len(candidates)} structures; expected at most {MAX_CANDIDATES}")

@@ -1,0 +1,150 @@
+"""``atg-fg structure``: look at what a robot memory has learned of the structure that its objects share."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+from rich.table import Table
+
+from atg_fg import figures, store
+from atg_fg.cli import options
+from atg_fg.errors import InvalidInputError
+from atg_fg.structure.completed_picture import draw_completed_atg, probability_text
+from atg_fg.structure.completion import CompletedGraph, completed_atg, statuses
+from atg_fg.structure.learner import BelievedStructure
+from atg_fg.structure.memory import StructuredMemory
+from atg_fg.structure.structure_picture import draw_structure
+from atg_fg.structure.words import permutation_text, register_names
+
+app = typer.Typer(help="Look at the structure that a robot memory has learned.", no_args_is_help=True)
+
+MemoryFile = Annotated[Path, typer.Argument(help="A memory file (JSON).", show_default=False)]
+
+
+# Without it typer would make the only command of the group the group itself.
+@app.callback()
+def group() -> None:
+    """Look at the structure that a robot memory has learned."""
+
+
+@app.command()
+def show(
+    file: MemoryFile,
+    name: Annotated[str | None, typer.Option("--object", help="Show what is predicted of this object.")] = None,
+    plot: Annotated[
+        Path | None,
+        typer.Option(help="Draw the structure, or the completed ATG of --object, into this .png, .svg or .pdf file."),
+    ] = None,
+    json_file: options.JsonFile = None,
+) -> None:
+    """Show the learned structure: registers, permutations, rates, and what it predicts of each object.
+
+    Example: atg-fg structure show memory.json --plot structure.png
+    """
+    options.check_json_option(json_file)
+    if plot is not None:
+        figures.check_figure_path(plot)
+    memory = store.load_memory(file)
+    learned = memory if isinstance(memory, StructuredMemory) else None
+    believed = learned.learner.believed(learned.names) if learned is not None else []
+    if name is not None:
+        memory[name]  # refused before anything is written
+    if learned is None or not believed:
+        _tell_none(file, learned, plot, json_file)
+        return
+    completed = {each: completed_atg(learned, each, believed) for each in ([name] if name else learned.names)}
+    if plot is not None:
+        figure = draw_structure(believed[0].structure, memory.assumptions)
+        if name is not None:
+            figure = draw_completed_atg(completed[name], memory.assumptions)
+        figures.save_figure(figure, plot)
+    document = _document(learned, believed, completed)
+    if name is not None:
+        document["completed"] = _graph_document(completed[name])
+    options.write_json(document, json_file)
+    if json_file != "-":
+        _tell(file, document)
+
+
+def _tell_none(file: Path, memory: StructuredMemory | None, plot: Path | None, json_file: str | None) -> None:
+    """Say that there is no structure, in one line."""
+    if memory is None:
+        reason = "its trials were not kept; trials with --preset learned are"
+    else:
+        reason = f"none explains its {len(memory.learner.trials)} trials better than plain ATGs do"
+    if plot is not None:
+        raise InvalidInputError(f"--plot: {file} has no learned structure to draw: {reason}")
+    trials = 0 if memory is None else len(memory.learner.trials)
+    options.write_json({"command": "structure show", "trials": trials, "structures": [], "objects": []}, json_file)
+    if json_file != "-":
+        typer.echo(f"{file}: no learned structure: {reason}")
+
+
+def _document(
+    memory: StructuredMemory, believed: Sequence[BelievedStructure], completed: dict[str, CompletedGraph]
+) -> dict[str, Any]:
+    """Return what is shown as JSON knows it."""
+    learner = memory.learner
+    return {
+        "command": "structure show",
+        "trials": len(learner.trials),
+        "evaluations": learner.n_evaluations,
+        "rates": learner.rates.to_json(),
+        "structures": [
+            _structure_document(each, learner.gain + math.log(each.weight / believed[0].weight), memory)
+            for each in believed
+        ],
+        "objects": [
+            {"name": name, "follows": graph.graph["follows"], **statuses(graph)} for name, graph in completed.items()
+        ],
+    }
+
+
+def _structure_document(each: BelievedStructure, gain: float, memory: StructuredMemory) -> dict[str, Any]:
+    names = register_names(each.structure, memory.assumptions.alphabet.slots)
+    actions = zip(memory.assumptions.actions, each.structure.sources, strict=True)
+    return {
+        "weight": each.weight,
+        "gain": gain,
+        "aspects": len(each.structure.poses().registers),
+        "registers": list(names),
+        "sources": {action: [names[source] for source in sources] for action, sources in actions},
+    }
+
+
+def _graph_document(graph: CompletedGraph) -> dict[str, Any]:
+    """Return a completed ATG as JSON knows it."""
+    return {
+        "aspects": [{"id": node, **data} for node, data in graph.nodes(data=True)],
+        "transitions": [{"from": source, "to": target, **data} for source, target, data in graph.edges(data=True)],
+    }
+
+
+def _tell(file: Path, document: dict[str, Any]) -> None:
+    """Print for people what a document says."""
+    console = options.console()
+    console.print(f"{file}: {document['trials']} trials, {document['evaluations']} structures scored in searches")
+    for number, structure in enumerate(document["structures"], start=1):
+        registers = structure["registers"]
+        console.print(
+            f"structure {number}: probability {probability_text(structure['weight'])}, "
+            f"{structure['gain']:.1f} nats better than none, {structure['aspects']} aspects, "
+            f"registers {', '.join(registers)}",
+            soft_wrap=True,
+        )
+        for action, sources in structure["sources"].items():
+            indices = [registers.index(source) for source in sources]
+            console.print(f"  {action}: {permutation_text(indices, registers)}", markup=False, soft_wrap=True)
+    rates = ", ".join(f"{name} {value:.4f}" for name, value in document["rates"].items())
+    console.print(f"rates: {rates}")
+    table = Table()
+    for heading in ("object", "follows it", "observed", "predicted", "unknown"):
+        table.add_column(heading, justify="left" if heading == "object" else "right")
+    for row in document["objects"]:
+        numbers = (str(row[status]) for status in ("observed", "predicted", "unknown"))
+        table.add_row(row["name"], probability_text(row["follows"]), *numbers)
+    console.print(table)

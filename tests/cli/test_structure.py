@@ -1,0 +1,68 @@
+import json
+
+import pytest
+
+from atg_fg import store
+from atg_fg.assumptions import arcube_assumptions
+from atg_fg.memory import RobotMemory
+from atg_fg.structure.memory import StructuredMemory
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory):
+    return tmp_path_factory.mktemp("structure") / "memory.json"
+
+
+def test_trials_one_after_the_other_make_a_memory_in_which_the_cube_is_found(run, file):
+    for seed in range(5):
+        before = ["--memory", file] if seed else []
+        assert run("trial", "--preset", "learned", *before, "--save-memory", file, "--seed", seed)[0] == 0
+    status, output, _ = run("structure", "show", file)
+    assert status == 0
+    assert "24 aspects, registers front, top, c3, c4, c5, c6" in output
+    assert "flip: front ← top" in output
+    document = json.loads(run("structure", "show", file, "--json", "-")[1])
+    assert (document["trials"], document["structures"][0]["aspects"]) == (5, 24)
+    assert document["evaluations"] > 0
+    assert document["structures"][0]["gain"] > 50
+    assert document["structures"][0]["sources"]["flip"][0] == "top"
+    assert set(document["rates"]) == {"slip", "wrong", "repeat", "share"}
+    for row in document["objects"]:
+        assert row["follows"] > 0.99
+        assert row["observed"] + row["predicted"] + row["unknown"] == 24
+
+
+def test_structure_and_completed_graphs_are_drawn_and_exported(run, file, tmp_path):
+    assert run("structure", "show", file, "--plot", tmp_path / "structure.png")[0] == 0
+    named = ("--object", "object-001", "--plot", tmp_path / "object.svg", "--json", tmp_path / "object.json")
+    assert run("structure", "show", file, *named)[0] == 0
+    assert (tmp_path / "structure.png").read_bytes().startswith(b"\x89PNG")
+    assert (tmp_path / "object.svg").exists()
+    completed = json.loads((tmp_path / "object.json").read_text())["completed"]
+    assert (len(completed["aspects"]), len(completed["transitions"])) == (24, 72)
+    exported = run("memory", "export", file, "--name", "object-001", "--completed")[1]
+    assert exported.count("<node ") == 24
+
+
+def test_memories_without_structure_say_so_in_one_line(run, refused, tmp_path):
+    plain, empty = tmp_path / "plain.json", tmp_path / "empty.json"
+    store.save_memory(RobotMemory(arcube_assumptions()), plain)
+    store.save_memory(StructuredMemory(arcube_assumptions()), empty)
+    for file, reason in ((plain, "its trials were not kept"), (empty, "none explains its 0 trials")):
+        status, output, _ = run("structure", "show", file)
+        assert status == 0
+        assert output.count("\n") == 1
+        assert f"no learned structure: {reason}" in output
+        assert json.loads(run("structure", "show", file, "--json", "-")[1])["structures"] == []
+        assert "no learned structure to draw" in refused("structure", "show", file, "--plot", tmp_path / "x.png")
+        assert not (tmp_path / "x.png").exists()
+
+
+def test_what_is_not_there_is_refused(run, refused, file, tmp_path):
+    assert "unknown name 'cup'" in refused("structure", "show", file, "--object", "cup")
+    assert "expected .png, .svg or .pdf" in refused("structure", "show", file, "--plot", tmp_path / "x.gif")
+    plain = tmp_path / "plain.json"
+    memory = RobotMemory(arcube_assumptions())
+    memory.learn([0], [], None)
+    store.save_memory(memory, plain)
+    assert "--completed" in refused("memory", "export", plain, "--completed")
