@@ -34,7 +34,7 @@ VARIANTS: Final[dict[str, Variant]] = {
     "paper": Variant("paper"),
     "default": Variant("default"),
     "learned": Variant("learned"),
-    "learned, lookahead": Variant("learned", "lookahead-2-pruned"),
+    "learned + lookahead": Variant("learned", "lookahead-2-pruned"),
 }
 
 #: Options of the world, by name.
