@@ -93,6 +93,7 @@ results-goal: $(READY)  ## Reach goal aspects with three cubes (about half an ho
 	$(BIN)/atg-fg $(GOAL) --trials 200 --learning-policy random --json results/goal_random.json
 	$(BIN)/atg-fg $(GOAL) --trials 200 --unreachable explore --json results/goal_exploring.json
 	$(BIN)/atg-fg $(GOAL) --trials 200 --planner value-iteration --json results/goal_value_iteration.json
+	$(BIN)/atg-fg goal --preset learned --trials 200 --json results/goal_learned.json
 	$(BIN)/atg-fg $(GOAL) --trials 20 --world robonaut --records results/goal_robonaut --resume \
 		--video docs/images/goal.gif --json results/goal_robonaut.json
 

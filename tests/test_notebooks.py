@@ -23,7 +23,7 @@ def sources(notebook):
 
 
 def test_there_are_these_notebooks_in_reading_order():
-    assert [path.stem[:2] for path in NOTEBOOKS] == ["01", "02", "03", "04", "05", "07", "08"]
+    assert [path.stem[:2] for path in NOTEBOOKS] == ["01", "02", "03", "04", "05", "06", "07", "08"]
 
 
 # A kernel's sockets are closed by its own threads, some time after the test; that is none of this project's.
