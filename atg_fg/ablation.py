@@ -156,8 +156,8 @@ def run_ablation(
         on_test: Called after each test that is run.
     """
     done = {(cell, seed): log.get(cell, seed) if log else None for cell in cells for seed in seeds}
-    # Short tests first, so that what is quick is there early.
-    missing = sorted((key for key, result in done.items() if result is None), key=lambda key: (key[0].actions, key[1]))
+    # Seed by seed, so that what is cut off has as many tests in each cell.
+    missing = sorted((key for key, result in done.items() if result is None), key=lambda key: key[1])
     plans = [(cell.plan(n_trials), seed) for cell, seed in missing]
     if plans:
         for key, result in zip(missing, run_tests(plans, jobs), strict=True):
