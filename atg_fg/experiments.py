@@ -120,7 +120,7 @@ def run_test(
     """
     objects_seed, *trial_seeds = np.random.SeedSequence(seed).spawn(1 + plan.n_trials)
     policy = make_policy(plan.policy, plan.settled)
-    score = _Score()
+    score = Score()
     with closing(plan.make_world(int(objects_seed.generate_state(1)[0]))) as world:
         memory = memory_for(plan.parameters, RobotMemory(assumptions_of(world, plan.n_objects)))
         log = _open_log(plan, seed, records, memory)
@@ -178,7 +178,7 @@ def learn_from(record: TrialRecord | TrialOutcome, memory: RobotMemory) -> str |
     return name
 
 
-class _Score:
+class Score:
     """Counts what is right over the trials of one test, by the truth rather than by the memory."""
 
     def __init__(self) -> None:

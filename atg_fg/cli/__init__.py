@@ -8,7 +8,7 @@ from importlib.metadata import entry_points
 import typer
 import typer.exceptions
 
-from atg_fg.cli import ablation, demo, engines, experiments, explain, goal, memory, structure, trials, uai
+from atg_fg.cli import ablation, demo, engines, experiments, explain, goal, memory, rescore, structure, trials, uai
 from atg_fg.errors import AtgError
 
 app = typer.Typer(
@@ -22,6 +22,7 @@ app.command()(demo.demo)
 app.command()(experiments.table1)
 app.command()(experiments.figure3)
 app.command()(ablation.ablation)
+app.command()(rescore.rescore)
 app.command()(goal.goal)
 app.command()(trials.trial)
 app.command()(trials.replay)

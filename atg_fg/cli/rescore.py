@@ -1,0 +1,53 @@
+"""``atg-fg rescore``: recorded tests judged by another model."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.table import Table
+
+from atg_fg.assumptions import arcube_assumptions
+from atg_fg.cli import options
+from atg_fg.experiments import pooled_interval
+from atg_fg.presets import preset as preset_named
+from atg_fg.recorded_evidence import rescore as judged_anew
+
+
+def rescore(
+    files: Annotated[list[Path], typer.Argument(help="Tests that table1 --records wrote.", show_default=False)],
+    preset: options.Preset = "learned",
+    engine: options.PresetsEngine = None,
+    json_file: options.JsonFile = None,
+) -> None:
+    """Judge recorded tests of ARcubes once more, from the same looks and actions, by another model.
+
+    Example: atg-fg rescore results/robonaut/nominal_default/test-0000.jsonl.gz --preset learned
+    """
+    options.check_json_option(json_file)
+    parameters = preset_named(preset)
+    engine = options.engine_of(engine, parameters, "bayes-filter")
+    results = {str(file): judged_anew(file, arcube_assumptions(), engine, parameters) for file in files}
+    tests = [
+        {
+            "file": file,
+            "identification": list(result.identification),
+            "recognition": list(result.recognition),
+            "success": list(result.success),
+            "interval95": list(pooled_interval([result], "success")),
+        }
+        for file, result in results.items()
+    ]
+    document = {"command": "rescore", "parameters": {"preset": preset, "engine": engine}, "tests": tests}
+    options.write_json(document, json_file)
+    if json_file != "-":
+        table = Table(title=f"Recorded tests, judged with preset {preset}, engine {engine}", title_justify="left")
+        for heading in ("Test", "Correct identification", "Correct recognition", "Success rate"):
+            table.add_column(heading, justify="left" if heading == "Test" else "right")
+        for file, result in results.items():
+            low, high = pooled_interval([result], "success")
+            rate = f"{100 * result.success[0] / result.success[1]:.0f}% ({100 * low:.1f}-{100 * high:.1f})"
+            counts = (f"{right}/{total}" for right, total in (result.identification, result.recognition))
+            table.add_row(file, *counts, rate)
+        options.console().print(table)
