@@ -44,7 +44,7 @@ def rescore(
     if json_file != "-":
         table = Table(title=f"Recorded tests, judged with preset {preset}, engine {engine}", title_justify="left")
         for heading in ("Test", "Correct identification", "Correct recognition", "Success rate"):
-            table.add_column(heading, justify="left" if heading == "Test" else "right")
+            table.add_column(heading, justify="left" if heading == "Test" else "right", overflow="fold")
         for file, result in results.items():
             low, high = pooled_interval([result], "success")
             rate = f"{100 * result.success[0] / result.success[1]:.0f}% ({100 * low:.1f}-{100 * high:.1f})"
