@@ -44,10 +44,11 @@ def rescore(
     if json_file != "-":
         table = Table(title=f"Recorded tests, judged with preset {preset}, engine {engine}", title_justify="left")
         for heading in ("Test", "Correct identification", "Correct recognition", "Success rate"):
-            table.add_column(heading, justify="left" if heading == "Test" else "right", overflow="fold")
+            table.add_column(heading, justify="left" if heading == "Test" else "right")
         for file, result in results.items():
+            name = f"{Path(file).parent.name}\n{Path(file).name.removesuffix('.jsonl.gz')}"
             low, high = pooled_interval([result], "success")
             rate = f"{100 * result.success[0] / result.success[1]:.0f}% ({100 * low:.1f}-{100 * high:.1f})"
             counts = (f"{right}/{total}" for right, total in (result.identification, result.recognition))
-            table.add_row(file, *counts, rate)
+            table.add_row(name, *counts, rate)
         options.console().print(table)
