@@ -10,6 +10,7 @@ from rich.table import Table
 
 from atg_fg.assumptions import arcube_assumptions
 from atg_fg.cli import options
+from atg_fg.engines import check_engine
 from atg_fg.experiments import pooled_interval
 from atg_fg.presets import preset as preset_named
 from atg_fg.recorded_evidence import rescore as judged_anew
@@ -28,6 +29,7 @@ def rescore(
     options.check_json_option(json_file)
     parameters = preset_named(preset)
     engine = options.engine_of(engine, parameters, "bayes-filter")
+    check_engine(engine, parameters)
     results = {str(file): judged_anew(file, arcube_assumptions(), engine, parameters) for file in files}
     tests = [
         {
