@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from atg_fg.duplicates import Duplicate, merge_duplicates
 from atg_fg.engines import begin_trial, check_engine
 from atg_fg.engines.base import Inference
 from atg_fg.errors import InvalidInputError
@@ -21,7 +22,7 @@ from atg_fg.parameters import ModelParameters
 from atg_fg.policies import make_policy
 from atg_fg.smoothed_learning import smoothed_patterns
 from atg_fg.statistics import mean, mean_interval, standard_error, wilson_interval
-from atg_fg.store import make_folder
+from atg_fg.store import make_folder, save_memory
 from atg_fg.structure.memory import memory_for
 from atg_fg.trial import TrialRecord, run_trial
 from atg_fg.trial_log import TrialLog, TrialOutcome
@@ -40,6 +41,7 @@ class TestPlan:
         parameters: α, δ and whether to learn within the trial.
         smoothed_learning: Whether the memory learns the patterns that are probable given all evidence of a trial,
             rather than those that were seen whole.
+        merge_duplicates: Whether the memory looks after each trial for ATGs of one object, and merges them.
         n_actions: Actions a trial; the most, if trials end when the verdict is settled.
         n_trials: Trials a test.
         n_objects: |O|, unless a user's own world says another in its assumptions.
@@ -54,6 +56,7 @@ class TestPlan:
     policy: str = "entropy"
     parameters: ModelParameters = field(default_factory=ModelParameters)
     smoothed_learning: bool = False
+    merge_duplicates: bool = False
     n_actions: int = 10
     n_trials: int = 100
     n_objects: int = 100
@@ -84,6 +87,7 @@ class TestResult:
         lost: Trials that ended because the world lost the object.
         undecided: Trials in which nothing at all was seen.
         actions: Number of actions of each trial.
+        merges: (false merges, merges), if duplicates were merged; false are those of ATGs made from two objects.
     """
 
     __test__ = False
@@ -95,6 +99,7 @@ class TestResult:
     lost: int = 0
     undecided: int = 0
     actions: tuple[int, ...] = ()
+    merges: tuple[int, int] | None = None
 
 
 def run_test(
@@ -103,6 +108,7 @@ def run_test(
     records: Path | None = None,
     resume: bool = False,
     on_trial: Callable[[int, TrialRecord], None] | None = None,
+    memories: Path | None = None,
 ) -> TestResult:
     """Run a test from an empty memory and score it.
 
@@ -114,6 +120,7 @@ def run_test(
         records: Folder in which every trial is saved as it ends.
         resume: Go on after the trials that are already there; the result is the same as of a test in one go.
         on_trial: Called with the number and the record of each trial that is run.
+        memories: Folder in which the memory is saved at the end.
 
     Raises:
         InvalidInputError: The records are of another test, or already there while ``resume`` is false.
@@ -126,19 +133,28 @@ def run_test(
         log = _open_log(plan, seed, records, memory)
         if log is not None:
             for outcome in log.resume() if resume else log.begin():
-                score.add(outcome, learn_from(outcome, memory))
+                _learn_and_score(outcome, memory, plan, score)
         for number in range(score.n_trials, plan.n_trials):
             inference = begin_trial(plan.engine, memory, plan.parameters)
             rng = np.random.default_rng(trial_seeds[number])
             record = run_trial(world, inference, policy, plan.n_actions, rng)
             smoothed = _smoothed(inference, record) if plan.smoothed_learning else None
             outcome = TrialOutcome.of(record, smoothed)
-            score.add(outcome, learn_from(outcome, memory))
+            _learn_and_score(outcome, memory, plan, score)
             if log is not None:
                 log.append(record, outcome)
             if on_trial is not None:
                 on_trial(number, record)
-    return score.result(seed)
+    if memories is not None:
+        save_memory(memory, make_folder(memories) / f"memory-{seed:04}.json")
+    return score.result(seed, merging=plan.merge_duplicates)
+
+
+def _learn_and_score(outcome: TrialOutcome, memory: RobotMemory, plan: TestPlan, score: Score) -> None:
+    learned = learn_from(outcome, memory)
+    score.add(outcome, learned)
+    if plan.merge_duplicates and learned is not None:
+        score.add_merges(merge_duplicates(memory, plan.parameters, learned))
 
 
 def _open_log(plan: TestPlan, seed: int, records: Path | None, memory: RobotMemory) -> TrialLog | None:
@@ -185,6 +201,7 @@ class Score:
         self.n_trials = self.identified = self.recognised = self.judged_known = self.successes = 0
         self.lost = self.undecided = 0
         self._actions: list[int] = []
+        self.merges = self.false_merges = 0
         self._presented: set[object] = set()
         self._made_from: dict[str, object] = {}
 
@@ -208,8 +225,14 @@ class Score:
         if learned is not None and outcome.verdict == "novel":
             self._made_from[learned] = outcome.object
 
-    def result(self, seed: int) -> TestResult:
-        """Return the scores of the test with this seed."""
+    def add_merges(self, merged: Sequence[Duplicate]) -> None:
+        """Count merges; the merged ATG counts as made from the object of the one that was kept."""
+        for each in merged:
+            self.merges += 1
+            self.false_merges += self._made_from[each.keep] != self._made_from[each.drop]
+
+    def result(self, seed: int, *, merging: bool = False) -> TestResult:
+        """Return the scores of the test with this seed, and of its merges if there was merging."""
         return TestResult(
             seed,
             (self.identified, self.n_trials),
@@ -218,19 +241,25 @@ class Score:
             self.lost,
             self.undecided,
             tuple(self._actions),
+            (self.false_merges, self.merges) if merging else None,
         )
 
 
 def run_tests(
-    plans: Sequence[tuple[TestPlan, int]], jobs: int = 1, records: Path | None = None, resume: bool = False
+    plans: Sequence[tuple[TestPlan, int]],
+    jobs: int = 1,
+    records: Path | None = None,
+    resume: bool = False,
+    memories: Path | None = None,
 ) -> Iterator[TestResult]:
     """Run each (plan, seed), in ``jobs`` processes, and yield the results in the order of ``plans``.
 
-    The results are the same for any number of jobs. ``records`` and ``resume`` are as for ``run_test``.
+    The results are the same for any number of jobs. ``records``, ``resume`` and ``memories`` are as for
+    ``run_test``.
     """
     if jobs < 1:
         raise InvalidInputError(f"jobs: {jobs}; expected a whole number of at least 1")
-    run = partial(run_test, records=records, resume=resume)
+    run = partial(run_test, records=records, resume=resume, memories=memories)
     if jobs == 1:
         yield from (run(plan, seed) for plan, seed in plans)
         return
@@ -259,6 +288,7 @@ def summarise(results: Iterable[TestResult]) -> dict[str, Any]:
                 "success": test.success[0] / test.success[1],
                 "lost": test.lost,
                 "undecided": test.undecided,
+                **_merges_of([test]),
             }
             for test in tests
         ],
@@ -267,6 +297,7 @@ def summarise(results: Iterable[TestResult]) -> dict[str, Any]:
         "interval95": {name: list(pooled_interval(tests, name)) for name in rates},
         "lost": sum(test.lost for test in tests),
         "undecided": sum(test.undecided for test in tests),
+        **_merges_of(tests),
     }
 
 
@@ -275,6 +306,14 @@ def actions_a_trial(results: Iterable[TestResult]) -> dict[str, Any]:
     numbers = [number for test in results for number in test.actions]
     interval = mean_interval(numbers)
     return {"mean": mean(numbers), "interval95": None if interval is None else list(interval)}
+
+
+def _merges_of(tests: Sequence[TestResult]) -> dict[str, int]:
+    """Return the merges of tests, and how many of them were false; nothing if duplicates were not merged."""
+    counts = [test.merges for test in tests if test.merges is not None]
+    if not counts:
+        return {}
+    return {"merges": sum(number for _, number in counts), "false_merges": sum(false for false, _ in counts)}
 
 
 def pooled_interval(tests: Sequence[TestResult], score: str) -> tuple[float, float]:

@@ -128,6 +128,20 @@ class AspectTransitionGraph:
             if source is not None and target is not None:
                 self.add_transition(source, action, target)
 
+    def absorb(self, other: AspectTransitionGraph) -> None:
+        """Add the aspects and counts of another graph; a full graph takes no further aspects, nor what leads to them.
+
+        Raises:
+            InvalidInputError: It was made under other assumptions.
+        """
+        if other.assumptions != self.assumptions:
+            raise InvalidInputError(f"{self.name}: {other.name!r} was made under other assumptions")
+        aspects = [self._aspect_for(pattern) for pattern in other.pattern_indices]
+        for (source, action, target), count in other.counts.items():
+            start, end = aspects[source], aspects[target]
+            if start is not None and end is not None:
+                self.add_transition(start, action, end, count)
+
     def _aspect_for(self, pattern: int | None) -> int | None:
         if pattern is None:
             return None

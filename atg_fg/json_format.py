@@ -107,7 +107,7 @@ def read_assumptions(value: Any, place: str) -> Assumptions:
     numbers = {
         key: read_integer(fields[key], f"{place}.{key}", least=1) for key in ("n_objects", "n_aspects", "n_symbols")
     }
-    with _placed(place):
+    with placed(place):
         alphabet = PatternAlphabet(texts["slots"], numbers["n_symbols"])
         return Assumptions(numbers["n_objects"], numbers["n_aspects"], texts["actions"], alphabet)
 
@@ -128,7 +128,7 @@ def read_memory(value: Any, assumptions: Assumptions, place: str) -> RobotMemory
     memory = RobotMemory(assumptions)
     for index, entry in enumerate(read_list(value, place)):
         graph = read_graph(entry, assumptions, f"{place}[{index}]")
-        with _placed(f"{place}[{index}]"):
+        with placed(f"{place}[{index}]"):
             memory.add(graph)
     return memory
 
@@ -139,7 +139,7 @@ def read_graph(value: Any, assumptions: Assumptions, place: str) -> AspectTransi
     graph = AspectTransitionGraph(read_text(fields["name"], f"{place}.name"), assumptions)
     for index, pattern in enumerate(read_list(fields["aspects"], f"{place}.aspects")):
         where = f"{place}.aspects[{index}]"
-        with _placed(where):
+        with placed(where):
             graph.add_aspect(assumptions.alphabet.check_pattern(read_list(pattern, where)))
     for index, entry in enumerate(read_list(fields["transitions"], f"{place}.transitions")):
         where = f"{place}.transitions[{index}]"
@@ -147,7 +147,7 @@ def read_graph(value: Any, assumptions: Assumptions, place: str) -> AspectTransi
         action = assumptions.action_index(edge["action"], f"{where}.action")
         ends = [read_integer(edge[key], f"{where}.{key}", least=0) for key in ("from", "to")]
         count = read_integer(edge["count"], f"{where}.count", least=1)
-        with _placed(where):
+        with placed(where):
             graph.add_transition(ends[0], action, ends[1], count)
     return graph
 
@@ -165,7 +165,7 @@ def write_graph(graph: AspectTransitionGraph) -> dict[str, Any]:
 
 
 @contextmanager
-def _placed(place: str) -> Iterator[None]:
+def placed(place: str) -> Iterator[None]:
     """Put a place in front of the message of an ``InvalidInputError`` raised inside."""
     try:
         yield

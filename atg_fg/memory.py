@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from atg_fg.assumptions import Assumptions
 from atg_fg.errors import InvalidInputError, unknown_name
 from atg_fg.graph import AspectTransitionGraph
+from atg_fg.merging import Merge, check_merges
 from atg_fg.patterns import Detection
 
 
@@ -16,16 +17,25 @@ class RobotMemory:
     Args:
         assumptions: |O|, |G|, actions and alphabet.
         graphs: ATGs under the same assumptions, with unique names.
+        merges: Those that led to these graphs, in their order.
 
     Raises:
-        InvalidInputError: A repeated name, or a graph made under other assumptions.
+        InvalidInputError: A repeated name, a graph made under other assumptions, or merges that lead to others.
     """
 
-    def __init__(self, assumptions: Assumptions, graphs: Iterable[AspectTransitionGraph] = ()) -> None:
+    def __init__(
+        self,
+        assumptions: Assumptions,
+        graphs: Iterable[AspectTransitionGraph] = (),
+        merges: Iterable[Merge] = (),
+    ) -> None:
         self.assumptions = assumptions
         self._graphs: dict[str, AspectTransitionGraph] = {}
+        self._merges: list[Merge] = []
         for graph in graphs:
             self.add(graph)
+        self._merges = list(merges)
+        check_merges(self._merges, self._graphs, "merges")
 
     def add(self, graph: AspectTransitionGraph) -> None:
         """Add the ATG of a novel object.
@@ -33,7 +43,7 @@ class RobotMemory:
         Raises:
             InvalidInputError: The name is taken, or the assumptions differ.
         """
-        if graph.name in self._graphs:
+        if graph.name in self._graphs or graph.name in self._dropped:
             raise InvalidInputError(f"memory: name {graph.name!r} is repeated; expected unique names")
         if graph.assumptions != self.assumptions:
             raise InvalidInputError(f"memory: {graph.name!r} was made under other assumptions than this memory")
@@ -73,13 +83,78 @@ class RobotMemory:
 
     def _new_name(self) -> str:
         number = len(self)
-        while f"object-{number:03d}" in self._graphs:
+        while f"object-{number:03d}" in self._graphs or f"object-{number:03d}" in self._dropped:
             number += 1
         return f"object-{number:03d}"
 
+    @property
+    def merges(self) -> tuple[Merge, ...]:
+        """What was merged and not undone, in its order."""
+        return tuple(self._merges)
+
+    @property
+    def _dropped(self) -> list[str]:
+        """Names of ATGs that were merged into others; they are kept free for undoing it."""
+        return [merge.dropped.name for merge in self._merges]
+
+    def merge(self, keep: str, drop: str) -> Merge:
+        """Make one ATG of two that were made from one object; return the record that ``unmerge`` goes by.
+
+        Args:
+            keep: Name of an ATG, which the merged one has.
+            drop: Name of another one, which is no more.
+
+        Raises:
+            UnknownNameError: There is no such ATG.
+            InvalidInputError: Both are the same.
+        """
+        if keep == drop:
+            raise InvalidInputError(f"merge: {keep!r} with itself; expected two ATGs")
+        kept, dropped = self[keep].copy(), self[drop].copy()
+        merge = Merge(kept, dropped, self.names.index(drop), self._merge_shared(keep, drop))
+        self._graphs[keep] = merge.merged()
+        del self._graphs[drop]
+        self._merges.append(merge)
+        return merge
+
+    def unmerge(self, name: str) -> None:
+        """Undo a merge: both ATGs are as they were; what was learned since stays with the one that was kept.
+
+        If merges are undone in reverse order and nothing was learned since, the memory is exactly as it was before.
+
+        Args:
+            name: Of the ATG that was dropped.
+
+        Raises:
+            UnknownNameError: No ATG of this name was merged into another.
+            InvalidInputError: The ATG that it was merged into has taken part in a later merge, to be undone first.
+        """
+        if name not in self._dropped:
+            raise unknown_name("unmerge", name, self._dropped)
+        number = self._dropped.index(name)
+        merge = self._merges[number]
+        for later in self._merges[number + 1 :]:
+            if merge.kept.name in (later.kept.name, later.dropped.name):
+                raise InvalidInputError(
+                    f"unmerge: {name!r}; expected {later.dropped.name!r}, which was merged later, to be undone first"
+                )
+        graphs = list(self._graphs.items())
+        graphs.insert(merge.position, (name, merge.dropped.copy()))
+        self._graphs = dict(graphs)
+        self._graphs[merge.kept.name] = merge.undone(self[merge.kept.name])
+        del self._merges[number]
+        self._unmerge_shared(merge)
+
+    def _merge_shared(self, keep: str, drop: str) -> tuple[int, ...]:
+        """Let what all objects share know of a merge; return the numbers of the raw trials that were of ``drop``."""
+        return ()
+
+    def _unmerge_shared(self, merge: Merge) -> None:
+        """Let what all objects share know that a merge was undone."""
+
     def copy(self) -> RobotMemory:
         """Return a memory that can learn without touching this one."""
-        return RobotMemory(self.assumptions, (graph.copy() for graph in self))
+        return RobotMemory(self.assumptions, (graph.copy() for graph in self), self._merges)
 
     def __getitem__(self, name: str) -> AspectTransitionGraph:
         try:
@@ -97,7 +172,7 @@ class RobotMemory:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, RobotMemory):
             return NotImplemented
-        return self.assumptions == other.assumptions and list(self) == list(other)
+        return (self.assumptions, list(self), self.merges) == (other.assumptions, list(other), other.merges)
 
     __hash__ = None  # type: ignore[assignment]
 

@@ -8,17 +8,23 @@ import tempfile
 from pathlib import Path
 from typing import Any, Final
 
+from atg_fg.assumptions import Assumptions
 from atg_fg.errors import InvalidInputError
 from atg_fg.json_format import (
     check_format,
     parse_json,
+    placed,
     read_assumptions,
+    read_graph,
+    read_integer,
+    read_list,
     read_memory,
     read_object,
     write_assumptions,
     write_graph,
 )
 from atg_fg.memory import RobotMemory
+from atg_fg.merging import Merge
 from atg_fg.structure.json_section import read_learner, write_learner
 from atg_fg.structure.memory import StructuredMemory
 
@@ -119,6 +125,8 @@ def memory_to_json(memory: RobotMemory) -> str:
         "assumptions": write_assumptions(memory.assumptions),
         "memory": [write_graph(graph) for graph in memory],
     }
+    if memory.merges:
+        document["merges"] = [_write_merge(merge) for merge in memory.merges]
     if isinstance(memory, StructuredMemory):
         document["structure"] = write_learner(memory.learner)
     return json.dumps(document, indent=1) + "\n"
@@ -127,11 +135,38 @@ def memory_to_json(memory: RobotMemory) -> str:
 def memory_from_json(text: str, place: str = "memory") -> RobotMemory:
     """Return the robot memory in a JSON document; errors name ``place``."""
     keys = ("format", "version", "assumptions", "memory")
-    document = read_object(parse_json(text, place), place, keys, optional=("structure",))
+    document = read_object(parse_json(text, place), place, keys, optional=("merges", "structure"))
     check_format(document, MEMORY_FORMAT, place)
     assumptions = read_assumptions(document["assumptions"], f"{place}: assumptions")
     memory = read_memory(document["memory"], assumptions, f"{place}: memory")
-    if "structure" not in document:
-        return memory
-    learner = read_learner(document["structure"], assumptions, memory.names, f"{place}: structure")
-    return StructuredMemory(assumptions, memory, learner)
+    entries = read_list(document.get("merges", []), f"{place}: merges")
+    merges = [_read_merge(entry, assumptions, f"{place}: merges[{index}]") for index, entry in enumerate(entries)]
+    learner = None
+    if "structure" in document:
+        learner = read_learner(document["structure"], assumptions, memory.names, f"{place}: structure")
+    with placed(place):
+        if learner is None:
+            return RobotMemory(assumptions, memory, merges)
+        return StructuredMemory(assumptions, memory, learner, merges)
+
+
+def _write_merge(merge: Merge) -> dict[str, Any]:
+    """Return a merge as JSON knows it."""
+    return {
+        "kept": write_graph(merge.kept),
+        "dropped": write_graph(merge.dropped),
+        "position": merge.position,
+        "trials": list(merge.trials),
+    }
+
+
+def _read_merge(value: Any, assumptions: Assumptions, place: str) -> Merge:
+    """Return the merge at ``place``."""
+    fields = read_object(value, place, ("kept", "dropped", "position", "trials"))
+    trials = read_list(fields["trials"], f"{place}.trials")
+    return Merge(
+        read_graph(fields["kept"], assumptions, f"{place}.kept"),
+        read_graph(fields["dropped"], assumptions, f"{place}.dropped"),
+        read_integer(fields["position"], f"{place}.position", least=0),
+        tuple(read_integer(number, f"{place}.trials[{index}]", least=0) for index, number in enumerate(trials)),
+    )

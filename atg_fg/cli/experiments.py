@@ -44,6 +44,12 @@ def table1(
     smoothed_learning: Annotated[
         bool, typer.Option("--smoothed-learning", help="Learn what is probable given all evidence of a trial.")
     ] = False,
+    merge_duplicates: Annotated[
+        bool, typer.Option("--merge-duplicates", help="After each trial, merge ATGs that are probably of one object.")
+    ] = False,
+    save_memories: Annotated[
+        Path | None, typer.Option(help="Folder in which the memory of each test is saved at its end.")
+    ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on after the trials that --records holds.")] = False,
     json_file: options.JsonFile = None,
 ) -> None:
@@ -57,6 +63,8 @@ def table1(
     options.check_json_option(json_file)
     if resume and records is None:
         raise InvalidInputError("--resume: no records to go on from; expected --records with their folder")
+    if save_memories is not None:
+        store.make_folder(save_memories)
     world_options = options.world_options(slip, wrong, missing, condition, urdf)
     model = preset_named(preset)
     engine = options.engine_of(engine, model, "gtsam")
@@ -67,6 +75,7 @@ def table1(
         policy=policy,
         parameters=model,
         smoothed_learning=smoothed_learning,
+        merge_duplicates=merge_duplicates,
         n_actions=actions,
         n_trials=trials,
         settled=settled,
@@ -74,7 +83,7 @@ def table1(
     with options.progress_bar("tests", tests) as advance:
         results = []
         plans = [(plan, seed + test) for test in range(tests)]
-        for result in run_tests(plans, jobs or options.available_cpus(), records, resume):
+        for result in run_tests(plans, jobs or options.available_cpus(), records, resume, save_memories):
             results.append(result)
             advance()
     summary = summarise(results)
@@ -95,6 +104,7 @@ def table1(
         **world_options,
         **({"smoothed_learning": True} if smoothed_learning else {}),
         **({} if settled is None else {"settled": settled}),
+        **({"merge_duplicates": True} if merge_duplicates else {}),
     }
     options.write_json({"command": "table1", "parameters": parameters, **summary}, json_file)
     if json_file != "-":
@@ -121,6 +131,8 @@ def _table1(title: str, results: Iterable[TestResult], summary: dict[str, Any]) 
     for ending in ("lost", "undecided"):
         if summary[ending]:
             table.add_row(f"{ending} trials", str(summary[ending]))
+    if "merges" in summary:
+        table.add_row("merged ATGs", str(summary["merges"]), f"{summary['false_merges']} falsely")
     table.add_row("paper", *(_percent(PAPER_TABLE1[score]) for score in scores))
     return table
 

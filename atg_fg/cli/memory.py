@@ -1,7 +1,8 @@
-"""``atg-fg memory``: look at a saved robot memory, check it, export its graphs."""
+"""``atg-fg memory``: look at a saved robot memory, check it, export its graphs, merge those of one object."""
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated
 
@@ -10,12 +11,14 @@ from rich.table import Table
 
 from atg_fg import store
 from atg_fg.cli import options
+from atg_fg.duplicates import find_duplicates
 from atg_fg.errors import InvalidInputError
 from atg_fg.export import view_to_dot, view_to_graphml
+from atg_fg.presets import preset as preset_named
 from atg_fg.structure.completion import completed_atg
 from atg_fg.structure.memory import StructuredMemory
 
-app = typer.Typer(help="Look at a saved robot memory, check it, export its graphs.", no_args_is_help=True)
+app = typer.Typer(help="Look at a saved robot memory, check it, export and merge its graphs.", no_args_is_help=True)
 
 MemoryFile = Annotated[Path, typer.Argument(help="A memory file (JSON).", show_default=False)]
 EXPORTS = {"graphml": view_to_graphml, "dot": view_to_dot}
@@ -103,3 +106,60 @@ def export(
         typer.echo(text, nl=False)
     else:
         store.write_bytes_atomically(output, text.encode())
+
+
+@app.command()
+def duplicates(
+    file: MemoryFile,
+    merge: Annotated[
+        bool, typer.Option("--merge", help="Merge them, the most probable pair first, and save the memory.")
+    ] = False,
+    threshold: Annotated[
+        float | None, typer.Option(help="Log odds, in nats, above which two ATGs are taken for one object.")
+    ] = None,
+    preset: Annotated[
+        str | None, typer.Option(help="Model parameters; learned if the memory has structure, else default.")
+    ] = None,
+    json_file: options.JsonFile = None,
+) -> None:
+    """Find ATGs that are probably of one object, as a false novelty leaves them, and merge them.
+
+    Example: atg-fg memory duplicates memory.json --merge
+    """
+    options.check_json_option(json_file)
+    if merge:
+        store.check_writable(file)
+    memory = store.load_memory(file)
+    usual = "learned" if isinstance(memory, StructuredMemory) else "default"
+    parameters = preset_named(preset or usual)
+    pairs = found = find_duplicates(memory, parameters, threshold)
+    if merge:
+        pairs = []
+        while found:  # anew after each: what was merged says more of the others
+            memory.merge(found[0].keep, found[0].drop)
+            pairs.append(found[0])
+            found = find_duplicates(memory, parameters, threshold)
+        if pairs:
+            store.save_memory(memory, file)
+    document = {"command": "memory duplicates", "merged": merge, "pairs": [asdict(pair) for pair in pairs]}
+    options.write_json(document, json_file)
+    if json_file != "-":
+        did = "merged" if merge else "probably of one object"
+        typer.echo(f"{file}: {len(pairs)} pairs of {len(memory) + len(pairs) * merge} ATGs {did}")
+        for pair in pairs:
+            typer.echo(f"{pair.keep} and {pair.drop}: log odds {pair.log_odds:.1f}")
+
+
+@app.command()
+def unmerge(
+    file: MemoryFile, name: Annotated[str, typer.Argument(help="The ATG that was merged into another one.")]
+) -> None:
+    """Undo a merge; what was learned since stays with the ATG that was kept.
+
+    Example: atg-fg memory unmerge memory.json object-007
+    """
+    store.check_writable(file)
+    memory = store.load_memory(file)
+    memory.unmerge(name)
+    store.save_memory(memory, file)
+    typer.echo(f"{file}: {name} is an ATG of its own again")

@@ -118,6 +118,22 @@ class StructureLearner:
         if self.trials:
             self._candidates = [self._scored(structure) for structure in structures]
 
+    def hand_over(self, numbers: Sequence[int], owner: str) -> None:
+        """Take raw trials for those of another object, and learn the contents of all objects anew.
+
+        Args:
+            numbers: Of the trials, in their order.
+            owner: Name of the object that they are of.
+        """
+        if not numbers:
+            return
+        for number in numbers:
+            self.owners[number] = owner
+        self._objects = {}
+        self._owner_indices = [self._objects.setdefault(each, len(self._objects)) for each in self.owners]
+        for candidate in self._candidates:
+            candidate.rescore(self.trials, self._owner_indices, self.rates)
+
     def same_as(self, other: StructureLearner) -> bool:
         """Return whether both learned the same from the same trials."""
         known, others = ((each.trials, each.owners, each.candidates, each.rates, each.seed) for each in (self, other))

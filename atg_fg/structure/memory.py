@@ -6,8 +6,10 @@ import copy
 from collections.abc import Iterable, Sequence
 
 from atg_fg.assumptions import Assumptions
+from atg_fg.errors import InvalidInputError
 from atg_fg.graph import AspectTransitionGraph
 from atg_fg.memory import RobotMemory
+from atg_fg.merging import Merge
 from atg_fg.parameters import ModelParameters
 from atg_fg.patterns import Detection
 from atg_fg.structure.learner import StructureLearner
@@ -21,9 +23,11 @@ class StructuredMemory(RobotMemory):
         assumptions: |O|, |G|, actions and alphabet.
         graphs: ATGs under the same assumptions, with unique names.
         learner: Its trials are of these ATGs; one that knows nothing yet if not given.
+        merges: Those that led to these graphs, in their order.
 
     Raises:
-        InvalidInputError: A repeated name, or a graph made under other assumptions.
+        InvalidInputError: A repeated name, a graph made under other assumptions, merges that lead to others, or that
+            name trials which are not there.
 
     Attributes:
         learner: The raw trials and the structures learned from them.
@@ -34,9 +38,15 @@ class StructuredMemory(RobotMemory):
         assumptions: Assumptions,
         graphs: Iterable[AspectTransitionGraph] = (),
         learner: StructureLearner | None = None,
+        merges: Iterable[Merge] = (),
     ) -> None:
-        super().__init__(assumptions, graphs)
+        super().__init__(assumptions, graphs, merges)
         self.learner = learner or StructureLearner(assumptions)
+        n_trials = len(self.learner.trials)
+        for number, merge in enumerate(self.merges):
+            for trial in merge.trials:
+                if not 0 <= trial < n_trials:
+                    raise InvalidInputError(f"merges[{number}].trials: {trial}; expected less than {n_trials}")
 
     def learn_shared(self, name: str, detections: Sequence[Detection], actions: Sequence[int]) -> None:
         """Keep a raw trial, and learn from it what all objects share.
@@ -54,9 +64,18 @@ class StructuredMemory(RobotMemory):
         trial.check(self.assumptions)
         self.learner.learn(self[name].name, trial)
 
+    def _merge_shared(self, keep: str, drop: str) -> tuple[int, ...]:
+        trials = tuple(number for number, owner in enumerate(self.learner.owners) if owner == drop)
+        self.learner.hand_over(trials, keep)
+        return trials
+
+    def _unmerge_shared(self, merge: Merge) -> None:
+        self.learner.hand_over(merge.trials, merge.dropped.name)
+
     def copy(self) -> StructuredMemory:
         """Return a memory that can learn without touching this one."""
-        return StructuredMemory(self.assumptions, (graph.copy() for graph in self), copy.deepcopy(self.learner))
+        graphs = (graph.copy() for graph in self)
+        return StructuredMemory(self.assumptions, graphs, copy.deepcopy(self.learner), self.merges)
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, RobotMemory):
@@ -76,5 +95,5 @@ class StructuredMemory(RobotMemory):
 def memory_for(parameters: ModelParameters, memory: RobotMemory) -> RobotMemory:
     """Return a memory with the ATGs of ``memory`` that learns what the parameters say is to be learned."""
     if parameters.learn_structure and not isinstance(memory, StructuredMemory):
-        return StructuredMemory(memory.assumptions, memory)
+        return StructuredMemory(memory.assumptions, memory, merges=memory.merges)
     return memory

@@ -51,3 +51,24 @@ def test_export_refuses_what_is_not_there(refused, file, tmp_path):
     assert "--format: 'svg'; expected one of: graphml, dot" in refused("memory", "export", file, "--format", "svg")
     store.save_memory(RobotMemory(arcube_assumptions()), file)
     assert "the memory is empty" in refused("memory", "export", file)
+
+
+def test_duplicates_are_found_merged_and_taken_apart_again(run, refused, tmp_path):
+    file = tmp_path / "memory.json"
+    memory = RobotMemory(arcube_assumptions())
+    for _ in range(2):
+        memory.learn([0, 1, 2, 3, 4, 5], [0, 1, 2, 0, 1], matched=None)
+    memory.learn([50, 51], [0], matched=None)
+    store.save_memory(memory, file)
+    before = file.read_text()
+    status, output, _ = run("memory", "duplicates", file)
+    assert (status, file.read_text()) == (0, before)
+    assert "1 pairs of 3 ATGs probably of one object\nobject-000 and object-001: log odds" in output
+    (pair,) = json.loads(run("memory", "duplicates", file, "--merge", "--json", "-")[1])["pairs"]
+    assert (pair["keep"], pair["drop"]) == ("object-000", "object-001")
+    assert store.load_memory(file).names == ("object-000", "object-002")
+    assert "0 pairs of 2 ATGs merged" in run("memory", "duplicates", file, "--merge")[1]
+    assert "unknown name 'object-002'; expected one of: object-001" in refused("memory", "unmerge", file, "object-002")
+    assert run("memory", "unmerge", file, "object-001")[0] == 0
+    assert file.read_text() == before
+    assert "threshold: nan" in refused("memory", "duplicates", file, "--threshold", "nan")
