@@ -108,6 +108,9 @@ results-structure: $(READY)  ## Run the experiments on learned structure (about 
 		$(BIN)/atg-fg ablation --variants "default;learned" --noises ideal --actions 10 --worlds $$world --tests 10 \
 			--log results/ablation.jsonl --json results/ablation_$$world.json || exit; \
 	done
+	$(BIN)/atg-fg table1 --preset learned --tests 1 --trials 10 --save-memories out
+	$(BIN)/atg-fg structure show out/memory-0000.json --plot docs/images/structure.png
+	$(BIN)/atg-fg rescore results/robonaut/*/test-0000.jsonl.gz --preset learned --json results/rescore_learned.json
 	$(BIN)/atg-fg ablation --variants "paper;default;learned" --tests 10 --log results/ablation.jsonl \
 		--json results/ablation.json --plot docs/images/ablation.png
 
