@@ -162,6 +162,7 @@ def plot_ablation(entries: Sequence[Mapping[str, Any]]) -> Figure:
                     _plot_curve(axes, points * [1, 100, 100, 100], PALETTE[rank % len(PALETTE)], "os^Dvp"[rank % 6])
             axes.set_title(noise if len({world for world, _ in panels}) == 1 else f"{world}, {noise}", parse_math=False)
             axes.set(ylim=(0, 101), xlabel="actions per trial", ylabel="success rate (%)")
+            axes.set_xticks(sorted({entry["actions"] for entry in entries}))
             axes.label_outer()
         for axes in all_axes[len(panels) :]:
             axes.remove()
