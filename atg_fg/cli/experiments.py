@@ -39,6 +39,7 @@ def table1(
     missing: options.Missing = 0.0,
     condition: options.Condition = None,
     urdf: options.Urdf = None,
+    world_option: options.WorldOption = None,
     jobs: options.Jobs = None,
     records: Annotated[Path | None, typer.Option(help="Folder in which every trial is saved as it ends.")] = None,
     smoothed_learning: Annotated[
@@ -65,7 +66,7 @@ def table1(
         raise InvalidInputError("--resume: no records to go on from; expected --records with their folder")
     if save_memories is not None:
         store.make_folder(save_memories)
-    world_options = options.world_options(slip, wrong, missing, condition, urdf)
+    world_options = options.world_options(slip, wrong, missing, condition, urdf, world_option)
     model = preset_named(preset)
     engine = options.engine_of(engine, model, "gtsam")
     plan = TestPlan(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Annotated, Any
@@ -62,21 +62,39 @@ Condition = Annotated[
 Urdf = Annotated[Path | None, typer.Option(help="Your own description of the robot, such as NASA's (world robonaut).")]
 
 
+WorldOption = Annotated[
+    list[str] | None,
+    typer.Option(help="An option of the world's own, NAME=VALUE, such as n_successors=1; may be given again."),
+]
+
+
 def world_options(
     slip: float = 0.0,
     wrong: float = 0.0,
     missing: float = 0.0,
     condition: str | None = None,
     urdf: Path | None = None,
+    own: Sequence[str] | None = None,
 ) -> dict[str, Any]:
-    """Return the options for the world that are not zero and given."""
+    """Return the options for the world that are not zero and given; ``own`` are those written NAME=VALUE."""
     noise = {"slip": slip, "wrong": wrong, "missing": missing}
     given: dict[str, Any] = {name: probability_option(f"--{name}", value) for name, value in noise.items() if value}
     if condition is not None:
         given["condition"] = condition
     if urdf is not None:
         given["urdf"] = str(urdf)
-    return given
+    return {**given, **dict(_own_option(text) for text in own or ())}
+
+
+def _own_option(text: str) -> tuple[str, Any]:
+    """Return name and value of an option written NAME=VALUE; a value that is no JSON is text."""
+    name, separator, value = text.partition("=")
+    if not name.isidentifier() or not separator:
+        raise InvalidInputError(f"--world-option: {text!r}; expected NAME=VALUE, such as n_successors=1")
+    try:
+        return name, json.loads(value)
+    except ValueError:
+        return name, value
 
 
 def engine_of(engine: str | None, parameters: ModelParameters, usual: str) -> str:

@@ -147,3 +147,12 @@ def test_table1_without_settled_says_nothing_of_it(run):
 @pytest.mark.parametrize("command", ["table1", "trial"])
 def test_an_entropy_that_settles_nothing_is_refused(refused, command):
     assert "--settled: 0.0; expected a finite entropy above 0 nats" in refused(command, "--settled", "0")
+
+
+def test_a_world_takes_options_of_its_own(run, refused):
+    quick = ["table1", *QUICK, "--tests", "1", "--actions", "3", "--world", "random-atg"]
+    document = json.loads(run(*quick, "--world-option", "n_successors=1", "--json", "-")[1])
+    assert document["parameters"]["n_successors"] == 1
+    assert "expected NAME=VALUE" in refused(*quick, "--world-option", "n_successors")
+    assert "n_successors" in refused(*quick, "--world-option", "n_successors=none")
+    assert "colour" in refused(*quick, "--world-option", "colour=red")
