@@ -104,9 +104,18 @@ results-structure: $(READY)  ## Run the experiments on learned structure (about 
 	$(BIN)/atg-fg table1 --preset learned --tests 20 --actions 6 --json results/table1_learned_6.json
 	$(BIN)/atg-fg table1 --preset learned --tests 20 --actions 4 --json results/table1_learned_4.json
 	$(BIN)/atg-fg table1 --preset learned --tests 20 --slip 0.02 --wrong 0.005 --json results/table1_learned_noisy.json
-	for world in half-and-half random-atg prism lock lid-box repeated-tags; do \
+	$(BIN)/atg-fg ablation --variants "default;learned" --noises ideal --actions 10 --tests 3 \
+		--worlds prism,lock,lid-box,repeated-tags \
+		--log results/ablation_worlds.jsonl --json results/ablation_other_worlds.json
+	for world in half-and-half random-atg; do \
 		$(BIN)/atg-fg ablation --variants "default;learned" --noises ideal --actions 10 --worlds $$world --tests 10 \
-			--log results/ablation.jsonl --json results/ablation_$$world.json || exit; \
+			--log results/ablation_worlds.jsonl --json results/ablation_$$world.json || exit; \
+	done
+	for world in half-and-half random-atg; do \
+		$(BIN)/atg-fg table1 --world $$world --world-option n_successors=1 --tests 10 --preset default \
+			--engine bayes-filter --json results/table1_$${world}_default.json || exit; \
+		$(BIN)/atg-fg table1 --world $$world --world-option n_successors=1 --tests 10 --preset learned \
+			--json results/table1_$${world}_learned.json || exit; \
 	done
 	$(BIN)/atg-fg table1 --preset learned --tests 1 --trials 10 --save-memories out
 	$(BIN)/atg-fg structure show out/memory-0000.json --plot docs/images/structure.png

@@ -20,6 +20,7 @@ SHORTER = {
     "sim": ["--actions", "1", "--jobs", "1"],
     "compare": ["--trials", "1"],
     "goal": ["--trials", "2"],
+    "ablation": ["--actions", "3", "--tests", "1", "--trials", "4"],
 }
 
 
