@@ -12,7 +12,7 @@ from atg_fg import ablation as experiment
 from atg_fg import figures, store
 from atg_fg.ablation import NOISES, VARIANTS, AblationLog, Cell
 from atg_fg.cli import options
-from atg_fg.cli.experiments import parse_actions
+from atg_fg.cli.experiments import parse_actions, success_with_interval
 from atg_fg.errors import InvalidInputError, unknown_name
 from atg_fg.plots import plot_ablation
 from atg_fg.worlds import WORLDS
@@ -97,10 +97,5 @@ def _table(title: str, entries: list[dict[str, Any]]) -> Table:
         table.add_column(variant, justify="right")
     cells = {(entry["actions"], entry["variant"]): entry for entry in entries}
     for number in dict.fromkeys(entry["actions"] for entry in entries):
-        table.add_row(str(number), *(_with_interval(cells[number, variant]) for variant in variants))
+        table.add_row(str(number), *(success_with_interval(cells[number, variant]) for variant in variants))
     return table
-
-
-def _with_interval(entry: dict[str, Any]) -> str:
-    low, high = entry["interval95"]
-    return f"{100 * entry['success']:.1f}% ({100 * low:.1f}-{100 * high:.1f})"

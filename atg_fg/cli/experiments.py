@@ -249,10 +249,11 @@ def _figure3_table(title: str, points: list[dict[str, Any]]) -> Table:
         table.add_column(f"{policy} policy", justify="right")
     cells = {(point["actions"], point["policy"]): point for point in points}
     for number in dict.fromkeys(point["actions"] for point in points):
-        table.add_row(str(number), *(_with_interval(cells[number, policy]) for policy in FIGURE3_POLICIES))
+        table.add_row(str(number), *(success_with_interval(cells[number, policy]) for policy in FIGURE3_POLICIES))
     return table
 
 
-def _with_interval(point: dict[str, Any]) -> str:
+def success_with_interval(point: dict[str, Any]) -> str:
+    """Return the success rate of a point of an experiment with its 95 % interval, as tables show it."""
     low, high = point["interval95"]
     return f"{_percent(point['success'])} ({100 * low:.1f}-{100 * high:.1f})"

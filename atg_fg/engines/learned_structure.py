@@ -104,13 +104,17 @@ class LearnedStructure(BayesFilter):
         total = log_sum_exp(np.concatenate(joints))
         return [np.exp(joint - total) for joint in joints]
 
+    def _plain_aspects(self, type_beliefs: list[FloatArray]) -> FloatArray:
+        """Return p(O, X_t, plain | z_0:t, a_1:t), shape [H, W]."""
+        return type_beliefs[0][:, None] * self._belief.aspects
+
     @property
     def aspect_belief(self) -> FloatArray:
         """p(O, X_t | z_0:t, a_1:t), shape [H, W]; a pose counts as the aspect that shows what it shows."""
         if not self._followed:
             return super().aspect_belief
         beliefs = self._type_beliefs()
-        joint = beliefs[0][:, None] * self._belief.aspects
+        joint = self._plain_aspects(beliefs)
         for each, belief in zip(self._followed, beliefs[1:], strict=True):
             owners, patterns = each.filter.shown_patterns()
             rows = np.repeat(owners, patterns.shape[1])
@@ -120,7 +124,7 @@ class LearnedStructure(BayesFilter):
     def situations(self) -> list[Situation]:
         """Return what the object may be, a plain ATG or a follower of a structure, and where in it the robot is."""
         beliefs = self._type_beliefs()
-        situations = situations_of(self.model, beliefs[0][:, None] * self._belief.aspects)
+        situations = situations_of(self.model, self._plain_aspects(beliefs))
         for each, belief in zip(self._followed, beliefs[1:], strict=True):
             situations += each.situations(belief)
         return situations
@@ -135,8 +139,7 @@ class LearnedStructure(BayesFilter):
             return super().shown_patterns()
         self._check_looked("shown patterns")
         beliefs = self._type_beliefs()
-        plain = beliefs[0][:, None] * self._belief.aspects
-        shown = shown_patterns_of(self.model, plain, self.history.evidence[-1])
+        shown = shown_patterns_of(self.model, self._plain_aspects(beliefs), self.history.evidence[-1])
         for each, belief in zip(self._followed, beliefs[1:], strict=True):
             owners, patterns = each.filter.shown_patterns()
             shown += belief[owners] @ patterns
@@ -153,8 +156,9 @@ class LearnedStructure(BayesFilter):
         self._check_looked("imagined")
         beliefs = self._type_beliefs()
         following = [Following(each.filter, belief) for each, belief in zip(self._followed, beliefs[1:], strict=True)]
-        plain = beliefs[0][:, None] * self._belief.aspects
-        return StructureBelief(self.model, plain, following, self.memory.assumptions.alphabet.symbols)
+        return StructureBelief(
+            self.model, self._plain_aspects(beliefs), following, self.memory.assumptions.alphabet.symbols
+        )
 
     def _expected_entropies(self) -> FloatArray:
         """Return eq. 3 for each action, shape [A], from p(O, z | a) summed over types, poses and contents."""

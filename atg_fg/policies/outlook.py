@@ -11,7 +11,8 @@ from atg_fg.patterns import FloatArray
 from atg_fg.policies.base import one_of_the_best
 from atg_fg.situations import Situation
 
-#: What an action costs of which no known path leads on; in expectations it must not drown what is probable.
+#: What an action costs of which no known path leads on: as much as a cube has aspects. More than any known path in an
+#: ARcube's ATG needs, but in expectations it must not drown what is probable.
 NO_PATH_COST: Final = 24.0
 
 
