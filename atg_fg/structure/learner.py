@@ -29,6 +29,11 @@ DENSE_MILESTONES: Final = 8
 SETTLED_GAIN: Final = 50.0
 #: A structure that takes this share of looks and symbols for errors is in doubt, however much it explains.
 DOUBTFUL_ERRORS: Final = 0.02
+#: A structure that takes a greater share of its followers' looks for errors is nearly right at best. It is not kept,
+#: however much it explains: the same mistakes come again with the same object, and a new object, whose mistakes are
+#: accidents as well, explains them as well as the right one. So many errors more are forgiven, for the first trials.
+MAX_WRONG: Final = 0.02
+FORGIVEN: Final = 2.0
 #: Structures that are believed in at once, and how many nats the others may be behind the best.
 MAX_BELIEVED: Final = 3
 BELIEVED_WITHIN: Final = 7.0
@@ -210,12 +215,20 @@ class StructureLearner:
         return candidate
 
     def _worth_keeping(self) -> list[Candidate]:
-        """Return the best candidates, best first, without those that are far behind or explain no trial."""
+        """Return the best candidates, best first, without those that are far behind, explain nothing or err much."""
         plain = np.array(self._plain)
-        useful = [each for each in self._candidates if each.responsibilities(plain).max() > 0.5]
+        useful = [
+            each
+            for each in self._candidates
+            if each.responsibilities(plain).max() > 0.5 and self._is_reliable(each, plain)
+        ]
         scored = sorted(((each.score(plain), each) for each in useful), key=lambda pair: -pair[0])
         best = max(float(plain.sum()), scored[0][0]) if scored else 0.0
         return [each for score, each in scored[:MAX_CANDIDATES] if score >= best - KEPT_WITHIN]
+
+    def _is_reliable(self, candidate: Candidate, plain: FloatArray) -> bool:
+        tally = candidate.tally(self.trials, plain)
+        return tally.wrong <= FORGIVEN + MAX_WRONG * tally.n_looks
 
     def _estimate_rates(self) -> None:
         """Estimate the rates under the best structure, if it is better than none, and score anew if they changed."""

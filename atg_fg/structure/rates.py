@@ -94,4 +94,6 @@ def estimate_rates(tally: Tally, followers: FloatArray) -> Rates:
 
 def _mean(name: str, events: float, occasions: float) -> float:
     a, b = PRIORS[name]
-    return float(np.clip((a + events) / (a + b + occasions), 1e-9, 1 - 1e-9))
+    mean = float(np.clip((a + events) / (a + b + occasions), 1e-9, 1 - 1e-9))
+    # Sums of the same trials, scored at once or one by one, differ in their last digits.
+    return float(f"{mean:.12g}")
