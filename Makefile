@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-all lint format notebooks bench results results-engines results-robot results-goal results-structure clean
+.PHONY: help setup demo test test-all lint format notebooks docs bench results results-engines results-robot results-goal results-structure clean
 
 help:  ## Say what there is to make
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -16,7 +16,7 @@ setup: $(READY)  ## Install everything into .venv
 $(READY): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1'
-	$(BIN)/python -m pip install --quiet --editable '.[sim,viz,notebooks]' --group test --group dev
+	$(BIN)/python -m pip install --quiet --editable '.[sim,viz,notebooks]' --group test --group dev --group docs
 	touch $@
 
 demo: $(READY)  ## Let the robot recognise an object by turning it over, told step by step and filmed
@@ -39,6 +39,9 @@ format: $(READY)  ## Mend style
 
 notebooks: $(READY)  ## Execute the notebooks, with the sources of their paired scripts
 	$(BIN)/python notebooks/execute.py
+
+docs: $(READY)  ## Build the documentation site in out/docs; a warning is an error
+	$(BIN)/sphinx-build -W --keep-going -q -b html docs out/docs
 
 bench: $(READY)  ## Time one decision of every engine, and the simulated robot, side by side
 	$(BIN)/python benchmarks/decision.py

@@ -14,7 +14,7 @@ from atg_fg.errors import InvalidInputError
 from atg_fg.patterns import FloatArray, IntArray, Pattern, PatternAlphabet
 
 #: A pattern, an action, and the patterns that it can lead to, each with its probability.
-Edge: TypeAlias = tuple[Pattern, int, frozenset[tuple[Pattern, float]]]
+ShownTransition: TypeAlias = tuple[Pattern, int, frozenset[tuple[Pattern, float]]]
 _State = TypeVar("_State", bound=Hashable)
 
 
@@ -105,7 +105,7 @@ class FiniteObject:
         return len(set(self.patterns))
 
     @cached_property
-    def appearance(self) -> frozenset[Edge]:
+    def appearance(self) -> frozenset[ShownTransition]:
         """What the robot could learn of the object: from which pattern an action leads to which.
 
         Two objects with unique patterns are the same up to the numbering of their states if and only if this is the

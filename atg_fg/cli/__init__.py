@@ -4,20 +4,51 @@ from __future__ import annotations
 
 import sys
 from importlib.metadata import entry_points
+from typing import Annotated
 
 import typer
 import typer.exceptions
 
-from atg_fg.cli import ablation, demo, engines, experiments, explain, goal, memory, rescore, structure, trials, uai
+from atg_fg import __version__
+from atg_fg.cli import (
+    ablation,
+    demo,
+    doctor,
+    engines,
+    experiments,
+    explain,
+    goal,
+    memory,
+    rescore,
+    structure,
+    trials,
+    uai,
+)
 from atg_fg.errors import AtgError
 
 app = typer.Typer(
     name="atg-fg",
-    help="Recognise objects by acting on them: Aspect Transition Graphs as discrete factor graphs.",
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
 )
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        print(f"atg-fg {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _common(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
+    ] = False,
+) -> None:
+    """Recognise objects by acting on them: Aspect Transition Graphs as discrete factor graphs."""
+
+
 app.command()(demo.demo)
 app.command()(experiments.table1)
 app.command()(experiments.figure3)
@@ -29,6 +60,7 @@ app.command()(trials.replay)
 app.command()(explain.explain)
 app.command()(engines.compare)
 app.command()(engines.calibrate)
+app.command()(doctor.doctor)
 app.add_typer(memory.app, name="memory")
 app.add_typer(structure.app, name="structure")
 app.add_typer(uai.app, name="uai")

@@ -1,0 +1,61 @@
+"""Settings of the documentation site; `make docs` builds it."""
+
+from __future__ import annotations
+
+import re
+import sys
+from pathlib import Path
+from typing import Any
+
+import atg_fg
+
+sys.path.insert(0, str(Path(__file__).parent))  # for code_links
+
+project = "atg-fg"
+author = "The atg-fg developers"
+copyright = author
+release = version = atg_fg.__version__
+
+extensions = [
+    "myst_nb",
+    "sphinx.ext.autodoc",
+    "sphinx.ext.autosummary",
+    "sphinx.ext.napoleon",
+    "sphinx.ext.viewcode",
+    "code_links",
+]
+html_theme = "furo"
+html_title = "atg-fg"
+html_static_path = ["_static"]
+html_css_files = ["site.css"]
+exclude_patterns = ["_build", "notebooks/*.py", "**.ipynb_checkpoints"]
+templates_path = ["_templates"]
+
+# Notebooks are stored with their outputs, and executed by the tests.
+nb_execution_mode = "off"
+myst_enable_extensions = ["dollarmath", "colon_fence"]
+myst_heading_anchors = 3
+# Pages that take in a section of the README begin at its level.
+suppress_warnings = ["myst.header"]
+
+autosummary_generate = True
+autodoc_member_order = "bysource"
+autodoc_typehints = "description"
+autodoc_typehints_description_target = "documented"
+napoleon_numpy_docstring = False
+napoleon_use_ivar = True  # autodoc describes attributes itself
+
+
+def _plain_docstring(app: Any, what: str, name: str, target: Any, options: Any, lines: list[str]) -> None:
+    """Keep Sphinx from taking |𝒵| for a substitution, and a name that ends in an underscore for a link."""
+    lines[:] = [re.sub(r"(?<!`)(\||\w_(?=\W|$))(?!`)", _escaped, line) for line in lines]
+
+
+def _escaped(found: re.Match[str]) -> str:
+    text = found.group(0)
+    return "\\|" if text == "|" else text[:-1] + "\\_"
+
+
+def setup(app: Any) -> None:
+    """Add what is of this site alone."""
+    app.connect("autodoc-process-docstring", _plain_docstring, priority=100)
