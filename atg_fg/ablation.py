@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Final
 
 from atg_fg.engines.learned_structure import LearnedStructure
-from atg_fg.errors import InvalidInputError
-from atg_fg.experiments import TestPlan, TestResult, pooled_interval, run_tests
+from atg_fg.experiments import TestPlan, TestResult, pooled_interval
 from atg_fg.presets import preset
+from atg_fg.result_log import ResultLog, run_logged
 from atg_fg.statistics import mean, standard_error
-from atg_fg.store import write_bytes_atomically
 
 
 @dataclass(frozen=True)
@@ -77,8 +75,8 @@ class Cell:
         )
 
 
-class AblationLog:
-    """Tests that have been run, a JSON line each, in a file that grows.
+class AblationLog(ResultLog[Cell]):
+    """Tests of cells that have been run.
 
     Args:
         path: The file, ``….jsonl``.
@@ -89,50 +87,8 @@ class AblationLog:
     """
 
     def __init__(self, path: Path, n_trials: int) -> None:
-        self.path = path
-        self._header = {"format": "atg-fg/ablation", "version": 1, "trials": n_trials}
-        self._results: dict[tuple[Cell, int], TestResult] = {}
-        if path.exists():
-            self._read()
-        else:
-            write_bytes_atomically(path, _line(self._header))
-
-    def get(self, cell: Cell, seed: int) -> TestResult | None:
-        """Return the result of a test, ``None`` if it was not run yet."""
-        return self._results.get((cell, seed))
-
-    def add(self, cell: Cell, result: TestResult) -> None:
-        """Add the result of a test."""
-        self._results[cell, result.seed] = result
-        scores = {name: getattr(result, name) for name in ("identification", "recognition", "success")}
-        with self.path.open("ab") as file:
-            file.write(_line({**asdict(cell), "seed": result.seed, **scores}))
-
-    def _read(self) -> None:
-        try:
-            content = self.path.read_bytes()
-            sound = content[: content.rfind(b"\n") + 1]  # a writer that was cut off leaves at most half a line
-            header, *lines = [json.loads(line) for line in sound.splitlines()]
-            if header != self._header:
-                raise ValueError(f"holds {json.dumps(header)}, not {json.dumps(self._header)}")
-            for line in lines:
-                self._take(line)
-        except (OSError, ValueError, KeyError, TypeError) as error:
-            raise InvalidInputError(f"{self.path}: {error}; expected the log of an ablation with such tests") from error
-        if len(sound) < len(content):
-            write_bytes_atomically(self.path, sound)
-
-    def _take(self, line: dict[str, Any]) -> None:
-        cell = Cell(line["variant"], line["world"], line["noise"], int(line["actions"]))
-        identification, recognition, success = (
-            (int(line[name][0]), int(line[name][1])) for name in ("identification", "recognition", "success")
-        )
-        result = TestResult(int(line["seed"]), identification, recognition, success)
-        self._results[cell, result.seed] = result
-
-
-def _line(entry: dict[str, Any]) -> bytes:
-    return (json.dumps(entry) + "\n").encode()
+        header = {"format": "atg-fg/ablation", "version": 1, "trials": n_trials}
+        super().__init__(path, "an ablation", header, Cell)
 
 
 def run_ablation(
@@ -142,31 +98,27 @@ def run_ablation(
     log: AblationLog | None = None,
     jobs: int = 1,
     on_test: Callable[[], None] | None = None,
+    executor: str = "process",
 ) -> dict[Cell, list[TestResult]]:
     """Run every cell with every seed, but for what the log holds, and return the results in the order of ``cells``.
 
-    The results are the same for any number of jobs, and after any interruption.
+    The results are the same for any executor and number of jobs, and after any interruption.
 
     Args:
         cells: What is to be run.
         seeds: Of the tests of each cell; the same for all, so that differences can be paired.
         n_trials: Trials a test.
         log: Where each test is kept as it ends.
-        jobs: Processes.
+        jobs: As for ``run_tests``.
         on_test: Called after each test that is run.
+        executor: As for ``run_tests``.
     """
-    done = {(cell, seed): log.get(cell, seed) if log else None for cell in cells for seed in seeds}
-    # Seed by seed, so that what is cut off has as many tests in each cell.
-    missing = sorted((key for key, result in done.items() if result is None), key=lambda key: key[1])
-    plans = [(cell.plan(n_trials), seed) for cell, seed in missing]
-    if plans:
-        for key, result in zip(missing, run_tests(plans, jobs), strict=True):
-            done[key] = result
-            if log is not None:
-                log.add(key[0], result)
-            if on_test is not None:
-                on_test()
-    results = {key: result for key, result in done.items() if result is not None}
+    # Seed by seed, so that what is cut off has as many tests in each cell; within a seed the longest first, so that no
+    # processor is at work alone at the end: each variant does what the one before it does, and more.
+    variants = list(VARIANTS)
+    longest_first = sorted(cells, key=lambda cell: (-variants.index(cell.variant), -cell.actions))
+    tests = [(cell, seed) for seed in sorted(seeds) for cell in longest_first]
+    results = run_logged(tests, lambda cell: cell.plan(n_trials), log, jobs, executor, on_test)
     return {cell: [results[cell, seed] for seed in seeds] for cell in cells}
 
 

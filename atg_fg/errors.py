@@ -29,6 +29,10 @@ class MissingDependencyError(AtgError, ImportError):
     """An optional package that is not installed; the message names the extra that brings it."""
 
 
+class WorkerLostError(AtgError, RuntimeError):
+    """Work whose worker died, and again when it was run again."""
+
+
 def unknown_name(kind: str, name: object, known: Iterable[object]) -> UnknownNameError:
     """Return the error for ``name`` missing from a registry, listing the names ``known`` there."""
     names = ", ".join(sorted(map(str, known)))

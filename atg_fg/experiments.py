@@ -1,12 +1,10 @@
-"""The paper's experiments (section 5): tests of 100 trials from an empty memory, Table 1 and Figure 3."""
+"""The paper's experiments (section 5): tests of 100 trials from an empty memory, and Table 1."""
 
 from __future__ import annotations
 
-import multiprocessing
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import closing
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -17,6 +15,7 @@ from atg_fg.duplicates import Duplicate, merge_duplicates
 from atg_fg.engines import begin_trial, check_engine
 from atg_fg.engines.base import Inference
 from atg_fg.errors import InvalidInputError
+from atg_fg.executors import run_pieces, stop_if_asked
 from atg_fg.memory import RobotMemory
 from atg_fg.parameters import ModelParameters
 from atg_fg.policies import make_policy
@@ -25,7 +24,7 @@ from atg_fg.statistics import mean, mean_interval, standard_error, wilson_interv
 from atg_fg.store import make_folder, save_memory
 from atg_fg.structure.memory import memory_for
 from atg_fg.trial import TrialRecord, run_trial
-from atg_fg.trial_log import TrialLog, TrialOutcome
+from atg_fg.trial_log import TrialLog, TrialOutcome, check_not_begun
 from atg_fg.worlds import World, assumptions_of, make_world_with
 
 
@@ -145,6 +144,7 @@ def run_test(
                 log.append(record, outcome)
             if on_trial is not None:
                 on_trial(number, record)
+            stop_if_asked()
     if memories is not None:
         save_memory(memory, make_folder(memories) / f"memory-{seed:04}.json")
     return score.result(seed, merging=plan.merge_duplicates)
@@ -161,10 +161,17 @@ def _open_log(plan: TestPlan, seed: int, records: Path | None, memory: RobotMemo
     if records is None:
         return None
     make_folder(records)
-    # What is as usual is left out, so that a plan may get more to say and old records still be gone on with.
+    return TrialLog(_log_path(records, seed), {"seed": seed, **unusual(plan)}, memory.assumptions)
+
+
+def _log_path(records: Path, seed: int) -> Path:
+    return records / f"test-{seed:04}.jsonl.gz"
+
+
+def unusual(plan: TestPlan) -> dict[str, Any]:
+    """Return what a plan has other than usual: a plan may get more to say, and old records still be gone on with."""
     usual = _described(TestPlan())
-    header = {"seed": seed, **{name: value for name, value in _described(plan).items() if value != usual[name]}}
-    return TrialLog(records / f"test-{seed:04}.jsonl.gz", header, memory.assumptions)
+    return {name: value for name, value in _described(plan).items() if value != usual[name]}
 
 
 def _described(plan: TestPlan) -> dict[str, Any]:
@@ -251,22 +258,30 @@ def run_tests(
     records: Path | None = None,
     resume: bool = False,
     memories: Path | None = None,
-) -> Iterator[TestResult]:
-    """Run each (plan, seed), in ``jobs`` processes, and yield the results in the order of ``plans``.
+    executor: str = "process",
+    on_result: Callable[[int, TestResult], None] | None = None,
+) -> list[TestResult]:
+    """Run each (plan, seed), beginning in this order, and return the results in this order.
 
-    The results are the same for any number of jobs. ``records``, ``resume`` and ``memories`` are as for
-    ``run_test``.
+    The results are the same for any executor and any number of jobs; see ``executors.run_pieces`` for these and for
+    ``on_result``. ``records``, ``resume`` and ``memories`` are as for ``run_test``; all workers must have the folders.
+
+    Raises:
+        InvalidInputError: As for ``run_test`` and ``run_pieces``.
     """
-    if jobs < 1:
-        raise InvalidInputError(f"jobs: {jobs}; expected a whole number of at least 1")
-    run = partial(run_test, records=records, resume=resume, memories=memories)
-    if jobs == 1:
-        yield from (run(plan, seed) for plan, seed in plans)
-        return
-    # Spawned workers share no state with this process, so they cannot inherit half of a library's.
-    context = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(min(jobs, len(plans)), mp_context=context) as executor:
-        yield from executor.map(run, *zip(*plans, strict=True))
+    if records is not None:
+        records = make_folder(records).resolve()
+        for _, seed in plans if not resume else ():
+            check_not_begun(_log_path(records, seed))
+    # Always to be gone on with from here, for a worker that dies leaves part of a test to the next one.
+    resolved = None if memories is None else memories.resolve()
+    run = partial(_run_one_of, records=records, memories=resolved)
+    return run_pieces(run, plans, executor, jobs, on_result)
+
+
+def _run_one_of(piece: tuple[TestPlan, int], records: Path | None, memories: Path | None) -> TestResult:
+    plan, seed = piece
+    return run_test(plan, seed, records, resume=True, memories=memories)
 
 
 def summarise(results: Iterable[TestResult]) -> dict[str, Any]:
@@ -320,36 +335,3 @@ def pooled_interval(tests: Sequence[TestResult], score: str) -> tuple[float, flo
     """Return the Wilson interval of a score over all trials of all tests."""
     counts = [getattr(test, score) for test in tests]
     return wilson_interval(sum(right for right, _ in counts), sum(number for _, number in counts))
-
-
-def figure3_points(
-    plan: TestPlan,
-    actions: Sequence[int],
-    policies: Sequence[str],
-    seeds: Sequence[int],
-    jobs: int = 1,
-    on_test: Callable[[], None] | None = None,
-) -> list[dict[str, Any]]:
-    """Return the success of each policy for each number of actions: the points of Figure 3."""
-    cells = [(n_actions, policy) for n_actions in actions for policy in policies]
-    plans = [(replace(plan, n_actions=n_actions, policy=policy), seed) for n_actions, policy in cells for seed in seeds]
-    results = []
-    for result in run_tests(plans, jobs):
-        results.append(result)
-        if on_test is not None:
-            on_test()
-    points = []
-    for number, (n_actions, policy) in enumerate(cells):
-        tests = results[number * len(seeds) : (number + 1) * len(seeds)]
-        rates = [test.success[0] / test.success[1] for test in tests]
-        points.append(
-            {
-                "actions": n_actions,
-                "policy": policy,
-                "success": mean(rates),
-                "interval95": list(pooled_interval(tests, "success")),
-                "standard_error": standard_error(rates),
-                "tests": len(tests),
-            }
-        )
-    return points

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import multiprocessing
-from collections.abc import Callable, Iterator
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Callable
 from contextlib import closing
 from dataclasses import asdict, dataclass, field
 from functools import partial
@@ -19,6 +17,7 @@ from atg_fg.assumptions import arcube_assumptions
 from atg_fg.belief import IdentityBelief
 from atg_fg.engines import begin_trial, check_engine
 from atg_fg.errors import InvalidInputError, unknown_name
+from atg_fg.executors import run_pieces
 from atg_fg.goal_records import GoalRunFile
 from atg_fg.goal_scoring import ServedObject, score
 from atg_fg.goals import Goal
@@ -29,6 +28,7 @@ from atg_fg.policies.goal import PLANNERS, SETTLED, UNREACHABLE
 from atg_fg.stations import AtStation, make_stations
 from atg_fg.store import make_folder
 from atg_fg.trial import TrialRecord, run_trial
+from atg_fg.trial_log import check_not_begun
 from atg_fg.worlds import World, check_arcube_world
 
 #: As ``learning_actions``: the memory knows all that there is to know.
@@ -155,35 +155,45 @@ def run_goals(
 
 
 def run_many(
-    plan: GoalPlan, seed: int, n_runs: int, jobs: int = 1, records: Path | None = None, resume: bool = False
-) -> Iterator[tuple[ServedObject, ...]]:
-    """Run the experiment ``n_runs`` times, in ``jobs`` processes, and yield what came of each run, in order.
+    plan: GoalPlan,
+    seed: int,
+    n_runs: int,
+    jobs: int = 1,
+    records: Path | None = None,
+    resume: bool = False,
+    executor: str = "process",
+    on_run: Callable[[], None] | None = None,
+) -> list[tuple[ServedObject, ...]]:
+    """Run the experiment ``n_runs`` times and return what came of each run, in order.
 
-    Each run has a seed of its own, spawned from ``SeedSequence(seed)``; any number of jobs gives the same results.
+    Each run has a seed of its own, spawned from ``SeedSequence(seed)``; any executor and any number of jobs give the
+    same results.
 
     Args:
         plan: What each run is made of.
         seed: Of all runs.
         n_runs: How many.
-        jobs: Processes.
-        records: Folder in which every run is saved as it ends.
+        jobs: As for ``executors.run_pieces``.
+        records: Folder in which every run is saved as it ends; all workers must have it.
         resume: Leave out the runs that are already there.
+        executor: As for ``executors.run_pieces``.
+        on_run: Called after each run.
 
     Raises:
         InvalidInputError: The records are there already, or of another experiment.
     """
-    for name, number in (("runs", n_runs), ("jobs", jobs)):
-        if number < 1:
-            raise InvalidInputError(f"{name}: {number}; expected a whole number of at least 1")
+    if n_runs < 1:
+        raise InvalidInputError(f"runs: {n_runs}; expected a whole number of at least 1")
     if records is not None:
-        make_folder(records)
-    run = partial(_run_and_save, plan, seed, records, resume)
-    if jobs == 1:
-        yield from map(run, range(n_runs))
-        return
-    # Spawned workers share no state with this process, so they cannot inherit half of a library's.
-    with ProcessPoolExecutor(min(jobs, n_runs), mp_context=multiprocessing.get_context("spawn")) as executor:
-        yield from executor.map(run, range(n_runs))
+        records = make_folder(records).resolve()
+        for number in range(n_runs) if not resume else ():
+            check_not_begun(_run_path(records, number))
+
+    def tell(_number: int, _served: tuple[ServedObject, ...]) -> None:
+        if on_run is not None:
+            on_run()
+
+    return run_pieces(partial(_run_and_save, plan, seed, records), range(n_runs), executor, jobs, tell)
 
 
 def run_seed(seed: int, number: int) -> np.random.SeedSequence:
@@ -191,17 +201,20 @@ def run_seed(seed: int, number: int) -> np.random.SeedSequence:
     return np.random.SeedSequence(seed, spawn_key=(number,))
 
 
-def _run_and_save(
-    plan: GoalPlan, seed: int, records: Path | None, resume: bool, number: int
-) -> tuple[ServedObject, ...]:
+def _run_path(records: Path, number: int) -> Path:
+    return records / f"run-{number:04}.json.gz"
+
+
+def _run_and_save(plan: GoalPlan, seed: int, records: Path | None, number: int) -> tuple[ServedObject, ...]:
+    """Run once; a run that is saved already, perhaps by a worker that died right after, is only read."""
     if records is None:
         return run_goals(plan, run_seed(seed, number)).served
     # What is as usual is left out, so that a plan may get more to say and old records still be gone on with.
     usual = asdict(GoalPlan())
     unusual = {name: value for name, value in asdict(plan).items() if value != usual[name]}
-    file = GoalRunFile(records / f"run-{number:04}.json.gz", {"seed": seed, "run": number, **unusual})
+    file = GoalRunFile(_run_path(records, number), {"seed": seed, "run": number, **unusual})
     if file.path.exists():
-        return file.read(resume)
+        return file.read()
     run = run_goals(plan, run_seed(seed, number))
     file.write(run.served, run.records)
     return run.served

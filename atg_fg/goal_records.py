@@ -39,14 +39,12 @@ class GoalRunFile:
         text = json.dumps(document, default=plain_json, allow_nan=False, separators=(",", ":"))
         write_bytes_atomically(self.path, gzip.compress(text.encode(), mtime=0))
 
-    def read(self, resume: bool = True) -> tuple[ServedObject, ...]:
+    def read(self) -> tuple[ServedObject, ...]:
         """Return what came of each goal.
 
         Raises:
-            InvalidInputError: ``resume`` is false, the file cannot be read, or it is of another run.
+            InvalidInputError: The file cannot be read, or it is of another run.
         """
-        if not resume:
-            raise InvalidInputError(f"{self.path}: is already there; expected another folder, or --resume to go on")
         try:
             document = json.loads(gzip.decompress(self.path.read_bytes()))
             served = tuple(_served(each) for each in document.pop("served"))

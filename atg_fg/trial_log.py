@@ -1,7 +1,8 @@
 """The trials of one test in a file that grows trial by trial, and is sound whenever it is cut off.
 
 Each line is a gzip member of its own: a header, then a trial a line. A writer that is killed leaves at most half of the
-last member, which ``read`` drops.
+last member, which ``read`` drops. A trial is put where it belongs rather than at the end of the file, so that two writers
+of one test do no harm: a worker of a cluster that is taken for lost may still be at it.
 """
 
 from __future__ import annotations
@@ -66,6 +67,7 @@ class TrialLog:
     def __init__(self, path: Path, header: Mapping[str, Any], assumptions: Assumptions) -> None:
         self.path = path
         self._assumptions = assumptions
+        self._end = path.stat().st_size if path.exists() else 0
         self._header = json.loads(json.dumps({**_FORMAT, **header}, default=plain_json))
 
     def begin(self) -> list[TrialOutcome]:
@@ -74,10 +76,11 @@ class TrialLog:
         Raises:
             InvalidInputError: It is already there, or cannot be written.
         """
-        if self.path.exists():
-            raise InvalidInputError(f"{self.path}: is already there; expected another folder, or --resume to go on")
+        check_not_begun(self.path)
         check_writable(self.path)
-        write_bytes_atomically(self.path, _member(self._header))
+        content = _member(self._header)
+        write_bytes_atomically(self.path, content)
+        self._end = len(content)
         return []
 
     def resume(self) -> list[TrialOutcome]:
@@ -94,6 +97,7 @@ class TrialLog:
             raise InvalidInputError(f"{self.path}: holds {found}; expected the trials of {json.dumps(self._header)}")
         with self.path.open("r+b") as file:
             file.truncate(sound)
+        self._end = sound
         return [self._outcome(line) for line in lines[1:]]
 
     def append(self, record: TrialRecord, outcome: TrialOutcome | None = None) -> None:
@@ -101,8 +105,11 @@ class TrialLog:
         line = summary_of(record)
         if outcome is not None and outcome.patterns != tuple(record.patterns):
             line["learned"] = outcome.patterns
-        with self.path.open("ab") as file:
-            file.write(_member(line))
+        content = _member(line)
+        with self.path.open("r+b") as file:
+            file.seek(self._end)
+            file.write(content)
+        self._end += len(content)
 
     def _outcome(self, line: dict[str, Any]) -> TrialOutcome:
         alphabet, names = self._assumptions.alphabet, self._assumptions.actions
@@ -118,6 +125,12 @@ class TrialLog:
             )
         except (KeyError, IndexError, TypeError, ValueError) as error:
             raise InvalidInputError(f"{self.path}: {error!r}; expected a trial a line") from error
+
+
+def check_not_begun(path: Path) -> None:
+    """Raise ``InvalidInputError`` if there is a file of records already."""
+    if path.exists():
+        raise InvalidInputError(f"{path}: is already there; expected another folder, or --resume to go on")
 
 
 def summary_of(record: TrialRecord) -> dict[str, Any]:

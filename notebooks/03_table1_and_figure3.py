@@ -31,7 +31,8 @@ import numpy as np
 
 from atg_fg.assumptions import arcube_assumptions
 from atg_fg.engines import begin_trial
-from atg_fg.experiments import TestPlan, TestResult, figure3_points, pooled_interval, run_test, run_tests, summarise
+from atg_fg.experiments import TestPlan, TestResult, pooled_interval, run_test, run_tests, summarise
+from atg_fg.figure3 import figure3_points
 from atg_fg.figures import GREY, PALETTE, figure_class, plot_style
 from atg_fg.graph import AspectTransitionGraph
 from atg_fg.memory import RobotMemory

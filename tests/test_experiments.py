@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from atg_fg.errors import InvalidInputError, UnknownNameError
-from atg_fg.experiments import TestPlan, TestResult, actions_a_trial, figure3_points, run_test, run_tests, summarise
+from atg_fg.experiments import TestPlan, TestResult, actions_a_trial, run_test, run_tests, summarise
+from atg_fg.figure3 import figure3_points
 from atg_fg.object_worlds import ObjectWorld
 from atg_fg.objects import FiniteObject, Mechanism, ObjectFamily
 from atg_fg.parameters import ModelParameters
@@ -113,7 +114,7 @@ def test_unknown_names_are_refused_before_any_work():
     with pytest.raises(UnknownNameError, match="world"):
         run_test(TestPlan(world="magic", parameters=ModelParameters()), 0)
     with pytest.raises(InvalidInputError, match="jobs: 0"):
-        next(run_tests([(QUICK, 0)], jobs=0))
+        run_tests([(QUICK, 0)], jobs=0)
 
 
 @pytest.fixture

@@ -29,9 +29,8 @@ def ablation(
     trials: options.Trials = 100,
     seed: options.Seed = 0,
     jobs: options.Jobs = None,
-    log: Annotated[
-        Path | None, typer.Option(help="Keep each test in this .jsonl file as it ends, and leave out those in it.")
-    ] = None,
+    executor: options.Executor = "process",
+    log: options.Log = None,
     json_file: options.JsonFile = None,
     plot: Annotated[Path | None, typer.Option(help="Draw the curves into this .png, .svg or .pdf file.")] = None,
 ) -> None:
@@ -41,6 +40,7 @@ def ablation(
     """
     options.check_at_least(1, tests=tests, trials=trials, jobs=jobs)
     options.check_at_least(0, seed=seed)
+    workers = options.check_executor_option(executor, jobs)
     options.check_json_option(json_file)
     if plot is not None:
         figures.check_figure_path(plot)
@@ -57,7 +57,7 @@ def ablation(
         kept = AblationLog(log, trials)
     with options.progress_bar("tests", len(cells) * tests) as advance:
         seeds = range(seed, seed + tests)
-        results = experiment.run_ablation(cells, seeds, trials, kept, jobs or options.available_cpus(), advance)
+        results = experiment.run_ablation(cells, seeds, trials, kept, workers, advance, executor)
     entries = experiment.summarise_ablation(results)
     parameters = {"tests": tests, "trials": trials, "seed": seed}
     options.write_json({"command": "ablation", "parameters": parameters, "cells": entries}, json_file)

@@ -14,7 +14,8 @@ from rich.table import Table
 from atg_fg import figures, store
 from atg_fg.cli import options
 from atg_fg.errors import InvalidInputError
-from atg_fg.experiments import TestPlan, TestResult, actions_a_trial, figure3_points, run_tests, summarise
+from atg_fg.experiments import TestPlan, TestResult, actions_a_trial, run_tests, summarise
+from atg_fg.figure3 import Figure3Log, figure3_points
 from atg_fg.plots import plot_success
 from atg_fg.presets import preset as preset_named
 
@@ -41,6 +42,7 @@ def table1(
     urdf: options.Urdf = None,
     world_option: options.WorldOption = None,
     jobs: options.Jobs = None,
+    executor: options.Executor = "process",
     records: Annotated[Path | None, typer.Option(help="Folder in which every trial is saved as it ends.")] = None,
     smoothed_learning: Annotated[
         bool, typer.Option("--smoothed-learning", help="Learn what is probable given all evidence of a trial.")
@@ -60,6 +62,7 @@ def table1(
     """
     options.check_at_least(1, tests=tests, actions=actions, trials=trials, jobs=jobs)
     options.check_at_least(0, seed=seed)
+    workers = options.check_executor_option(executor, jobs)
     options.check_settled_option(settled)
     options.check_json_option(json_file)
     if resume and records is None:
@@ -82,11 +85,8 @@ def table1(
         settled=settled,
     )
     with options.progress_bar("tests", tests) as advance:
-        results = []
         plans = [(plan, seed + test) for test in range(tests)]
-        for result in run_tests(plans, jobs or options.available_cpus(), records, resume, save_memories):
-            results.append(result)
-            advance()
+        results = run_tests(plans, workers, records, resume, save_memories, executor, lambda *_: advance())
     summary = summarise(results)
     if settled is not None:
         summary["actions_a_trial"] = actions_a_trial(results)
@@ -161,7 +161,9 @@ def figure3(
     wrong: options.Wrong = 0.0,
     missing: options.Missing = 0.0,
     jobs: options.Jobs = None,
+    executor: options.Executor = "process",
     json_file: options.JsonFile = None,
+    log: options.Log = None,
     csv_file: Annotated[Path | None, typer.Option("--csv", help="Write the points as CSV to this file.")] = None,
     plot: Annotated[Path | None, typer.Option(help="Draw the figure into this .png, .svg or .pdf file.")] = None,
 ) -> None:
@@ -172,6 +174,7 @@ def figure3(
     numbers = parse_actions(actions)
     options.check_at_least(1, tests=tests, trials=trials, jobs=jobs)
     options.check_at_least(0, seed=seed)
+    workers = options.check_executor_option(executor, jobs)
     options.check_json_option(json_file)
     # Before the long run, so that its result is not lost.
     if csv_file is not None:
@@ -187,9 +190,13 @@ def figure3(
         parameters=model,
         n_trials=trials,
     )
+    kept = None
+    if log is not None:
+        store.check_writable(log)
+        kept = Figure3Log(log, plan)
     seeds = range(seed, seed + tests)
     with options.progress_bar("tests", len(numbers) * len(FIGURE3_POLICIES) * tests) as advance:
-        points = figure3_points(plan, numbers, FIGURE3_POLICIES, seeds, jobs or options.available_cpus(), advance)
+        points = figure3_points(plan, numbers, FIGURE3_POLICIES, seeds, workers, advance, kept, executor)
     parameters = {
         "world": world,
         "engine": engine,

@@ -13,7 +13,7 @@ from atg_fg import figures
 from atg_fg.cli import options
 from atg_fg.errors import InvalidInputError, unknown_name
 from atg_fg.goal_experiment import COMPLETE, GoalPlan, run_goals, run_many, run_seed
-from atg_fg.goal_scoring import ServedObject, summarise
+from atg_fg.goal_scoring import summarise
 from atg_fg.policies import POLICIES
 from atg_fg.policies.goal import PLANNERS, SETTLED
 from atg_fg.presets import preset as preset_named
@@ -50,6 +50,7 @@ def goal(
     condition: options.Condition = None,
     urdf: options.Urdf = None,
     jobs: options.Jobs = None,
+    executor: options.Executor = "process",
     records: Annotated[Path | None, typer.Option(help="Folder in which every run is saved as it ends.")] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Leave out the runs that --records holds.")] = False,
     video: Annotated[
@@ -63,6 +64,7 @@ def goal(
     """
     options.check_at_least(1, trials=trials, jobs=jobs)
     options.check_at_least(0, seed=seed)
+    workers = options.check_executor_option(executor, jobs)
     options.check_json_option(json_file)
     if resume and records is None:
         raise InvalidInputError("--resume: no records to go on from; expected --records with their folder")
@@ -90,11 +92,8 @@ def goal(
     )
     if video is not None:
         _film(plan, seed, video)
-    runs: list[tuple[ServedObject, ...]] = []
     with options.progress_bar("runs", trials) as advance:
-        for served in run_many(plan, seed, trials, jobs or options.available_cpus(), records, resume):
-            runs.append(served)
-            advance()
+        runs = run_many(plan, seed, trials, workers, records, resume, executor, advance)
     summary = summarise(runs)
     parameters = {
         "world": world,

@@ -18,6 +18,7 @@ from atg_fg import store
 from atg_fg.engines import ENGINES
 from atg_fg.engines.learned_structure import LearnedStructure
 from atg_fg.errors import InvalidInputError
+from atg_fg.executors import EXECUTORS, check_executor, is_cluster
 from atg_fg.parameters import ModelParameters
 from atg_fg.policies import POLICIES, check_settled
 from atg_fg.presets import PRESETS
@@ -48,7 +49,14 @@ Actions = Annotated[int, typer.Option(help="Actions a trial.")]
 Tests = Annotated[int, typer.Option(help="Number of tests.")]
 Trials = Annotated[int, typer.Option(help="Trials a test.")]
 Jobs = Annotated[
-    int | None, typer.Option(help="Processes; the result is the same for any number. All processors if not given.")
+    int | None,
+    typer.Option(help="Processes or threads; the result is the same for any number. All processors if not given."),
+]
+Executor = Annotated[
+    str, typer.Option(help=f"Where tests or runs are done: {EXECUTORS}; the result is the same anywhere.")
+]
+Log = Annotated[
+    Path | None, typer.Option(help="Keep each test in this .jsonl file as it ends, and leave out those in it.")
 ]
 JsonFile = Annotated[
     str | None, typer.Option("--json", help="Write the result as JSON to this file, or - to print it.")
@@ -110,6 +118,14 @@ def check_at_least(least: int, **numbers: int | None) -> None:
         if value is not None and value < least:
             option = f"--{name.replace('_', '-')}"
             raise InvalidInputError(f"{option}: {value}; expected a whole number of at least {least}")
+
+
+def check_executor_option(executor: str, jobs: int | None) -> int:
+    """Refuse an executor that is none; return the number of processes or threads, all processors if not given."""
+    check_executor(executor, "--executor")
+    if jobs is not None and is_cluster(executor):
+        raise InvalidInputError(f"--jobs: {jobs}; expected none with --executor {executor}, which has its own workers")
+    return jobs or available_cpus()
 
 
 def check_settled_option(settled: float | None) -> None:
