@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
 import sys
 from collections.abc import Callable
-from concurrent.futures import CancelledError, Future
-from types import ModuleType
+from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from typing import Any, Final
 
 import atg_fg
@@ -37,15 +37,11 @@ class Cluster:
         distributed = _distributed(address)
         self._address = address
         self._killed: type[Exception] = distributed.KilledWorker
-        try:
-            self._client = distributed.Client(
-                address.replace("dask://", "tcp://"), timeout=PATIENCE, set_as_default=False
-            )
-        except (OSError, ValueError) as error:
-            raise InvalidInputError(
-                f"executor {address!r}: no scheduler answered within {PATIENCE} s; "
-                "expected the address that `dask scheduler` printed"
-            ) from error
+        url = address.replace("dask://", "tcp://")
+        # First, since a client that finds no scheduler does not end cleanly; in a thread, since a notebook has a loop.
+        with ThreadPoolExecutor(1) as pool:
+            pool.submit(asyncio.run, _check_scheduler(distributed, address, url)).result()
+        self._client = distributed.Client(url, timeout=PATIENCE, set_as_default=False)
         try:
             self._check_workers()
             self._executor = self._client.get_executor(pure=False)
@@ -92,15 +88,25 @@ class Cluster:
 
     def close(self) -> None:
         """Leave the cluster; pieces that were not begun are given up, others end there with nobody to tell."""
-        self._executor.shutdown(wait=False)
         self._client.close()
+
+
+async def _check_scheduler(distributed: Any, address: str, url: str) -> None:
+    try:
+        connection = await distributed.comm.connect(url, timeout=PATIENCE)
+    except Exception as error:  # of any kind: whatever listens there is free to answer with nonsense
+        raise InvalidInputError(
+            f"executor {address!r}: no scheduler answered within {PATIENCE} s; "
+            "expected the address that `dask scheduler` printed"
+        ) from error
+    await connection.close()
 
 
 def _version() -> str:
     return atg_fg.__version__
 
 
-def _distributed(address: str) -> ModuleType:
+def _distributed(address: str) -> Any:
     try:
         import distributed
     except ImportError as error:

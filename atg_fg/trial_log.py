@@ -1,8 +1,8 @@
 """The trials of one test in a file that grows trial by trial, and is sound whenever it is cut off.
 
 Each line is a gzip member of its own: a header, then a trial a line. A writer that is killed leaves at most half of the
-last member, which ``read`` drops. A trial is put where it belongs rather than at the end of the file, so that two writers
-of one test do no harm: a worker of a cluster that is taken for lost may still be at it.
+last member, which ``read`` drops. A trial is put where it belongs rather than at the end of the file, so that two
+writers of one test do no harm: a worker of a cluster that is taken for lost may still be at it.
 """
 
 from __future__ import annotations

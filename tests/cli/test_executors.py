@@ -1,0 +1,179 @@
+"""Many trials at once on the command line: the same bytes anywhere, and after workers or the command were killed."""
+
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from atg_fg.trial_log import read_trials
+from tests import dask_cluster
+from tests.dask_cluster import ROOT, wait_for
+
+#: Two tests that take long enough to be met in the middle, even on a quick machine.
+TABLE1 = ["table1", "--engine", "gtsam", "--tests", "2", "--trials", "12", "--actions", "4"]
+FIGURE3 = ["figure3", "--actions", "2:5", "--tests", "3", "--trials", "40"]
+ABLATION = ["ablation", "--variants", "paper;default", "--noises", "ideal", "--actions", "2:5", "--tests", "3"]
+ABLATION += ["--trials", "40"]
+GOAL = ["goal", "--engine", "bayes-filter", "--memory-cubes", "6", "--learning-actions", "8", "--trials", "8"]
+RECORDED = {"table1": TABLE1, "goal": GOAL}
+LOGGED = {"figure3": FIGURE3, "ablation": ABLATION}
+
+
+def begin(*arguments):
+    """Begin the command in a process group of its own, as a terminal does."""
+    code = "from atg_fg.cli import main; main()"
+    environment = {**os.environ, "PYTHONPATH": str(ROOT)}
+    return subprocess.Popen(
+        [sys.executable, "-c", code, *map(str, arguments)],
+        env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+    )  # fmt: skip
+
+
+def finish(process):
+    output, error = process.communicate(timeout=300)
+    return process.returncode, output, error
+
+
+def nobody_left(group):
+    try:
+        os.killpg(group, 0)
+    except ProcessLookupError:
+        return True
+    return False
+
+
+def workers_of(process):
+    """Return the ids of the spawned workers of a process (Linux)."""
+    children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
+    return [int(child) for child in children if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes()]
+
+
+def some_trials(folder):
+    return any(len(read_trials(path)) >= 2 for path in folder.glob("test-*.jsonl.gz"))
+
+
+def some_lines(log):
+    return log.exists() and len(log.read_bytes().splitlines()) >= 3
+
+
+def contents(folder):
+    return {path.name: path.read_bytes() for path in folder.iterdir()}
+
+
+@pytest.fixture(scope="module")
+def serial(tmp_path_factory):
+    """What each command comes to, one piece after the other: its JSON, and its records."""
+    folder = tmp_path_factory.mktemp("serial")
+    files = {}
+    for name, command in {**RECORDED, **LOGGED}.items():
+        kept = ["--records", folder / name] if name in RECORDED else []
+        status, _, error = finish(begin(*command, "--jobs", "1", "--json", folder / f"{name}.json", *kept))
+        assert (status, error) == (0, "")
+        files[name] = (folder / f"{name}.json").read_bytes(), contents(folder / name) if kept else None
+    return files
+
+
+@pytest.fixture(scope="module")
+def dask_address(tmp_path_factory):
+    pytest.importorskip("distributed")
+    folder = tmp_path_factory.mktemp("dask")
+    with dask_cluster.scheduler(folder) as (_, address), dask_cluster.workers(address, folder):
+        yield address
+
+
+def where(name, request):
+    return (
+        ["--executor", request.getfixturevalue("dask_address")] if name == "dask" else ["--executor", name, "--jobs", 2]
+    )
+
+
+@pytest.mark.parametrize("executor", ["process", "thread", "dask"])
+@pytest.mark.parametrize("name", [*RECORDED, *LOGGED])
+def test_the_result_is_that_of_a_serial_run_byte_for_byte(name, executor, serial, run, tmp_path, request):
+    kept = ["--records", tmp_path / "kept"] if name in RECORDED else ["--log", tmp_path / "kept"]
+    command = {**RECORDED, **LOGGED}[name]
+    status, _, error = run(*command, *where(executor, request), *kept, "--json", tmp_path / "json")
+    assert (status, error) == (0, "")
+    json, records = serial[name]
+    assert (tmp_path / "json").read_bytes() == json
+    assert records is None or contents(tmp_path / "kept") == records
+
+
+@pytest.mark.parametrize("executor", ["process", "thread", "dask"])
+def test_ctrl_c_leaves_what_is_finished_and_resume_goes_on(executor, serial, tmp_path, request):
+    records = tmp_path / "records"
+    command = [*TABLE1, *where(executor, request), "--records", records, "--json", tmp_path / "json"]
+    process = begin(*command)
+    wait_for(lambda: some_trials(records))
+    os.killpg(process.pid, signal.SIGINT)
+    assert finish(process) == (130, "", "")
+    wait_for(lambda: nobody_left(process.pid))
+    assert not (tmp_path / "json").exists()
+    status, _, error = finish(begin(*command, "--resume"))
+    assert (status, error) == (0, "")
+    assert ((tmp_path / "json").read_bytes(), contents(records)) == serial["table1"]
+
+
+@pytest.mark.parametrize("name", LOGGED)
+def test_tests_in_a_log_outlive_ctrl_c(name, serial, tmp_path):
+    log = tmp_path / "log.jsonl"
+    command = [*LOGGED[name], "--jobs", 2, "--log", log, "--json", tmp_path / "json"]
+    process = begin(*command)
+    wait_for(lambda: some_lines(log))
+    os.killpg(process.pid, signal.SIGINT)
+    assert finish(process) == (130, "", "")
+    wait_for(lambda: nobody_left(process.pid))
+    kept = log.read_bytes()
+    assert len(kept.splitlines()) < 25
+    status, _, error = finish(begin(*command))
+    assert (status, error) == (0, "")
+    assert log.read_bytes().startswith(kept)
+    assert len(log.read_bytes().splitlines()) == 25
+    assert (tmp_path / "json").read_bytes() == serial[name][0]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="finds processes in /proc")
+class TestKilled:
+    def test_a_worker_that_is_killed_changes_nothing(self, serial, tmp_path):
+        records = tmp_path / "records"
+        process = begin(*TABLE1, "--jobs", 2, "--records", records, "--json", tmp_path / "json")
+        wait_for(lambda: some_trials(records))
+        os.kill(workers_of(process)[0], signal.SIGKILL)
+        status, _, error = finish(process)
+        assert (status, error) == (0, "")
+        assert ((tmp_path / "json").read_bytes(), contents(records)) == serial["table1"]
+
+    def test_workers_leave_with_a_command_that_is_killed(self, serial, tmp_path):
+        records = tmp_path / "records"
+        command = [*TABLE1, "--jobs", 2, "--records", records, "--json", tmp_path / "json"]
+        process = begin(*command)
+        wait_for(lambda: some_trials(records))
+        assert len(workers_of(process)) == 2
+        process.kill()
+        process.communicate()
+        wait_for(lambda: nobody_left(process.pid))
+        assert finish(begin(*command, "--resume"))[0] == 0
+        assert ((tmp_path / "json").read_bytes(), contents(records)) == serial["table1"]
+
+
+@pytest.mark.parametrize("command", ["table1", "figure3", "ablation", "goal"])
+def test_bad_executors_are_one_line(command, refused):
+    assert "--executor: 'magic'; expected process, thread or dask://host:port" in refused(
+        command, "--executor", "magic"
+    )
+    both = ["--executor", "dask://host:1", "--jobs", "2"]
+    assert "--jobs: 2; expected none with --executor dask://host:1" in refused(command, *both)
+
+
+def test_without_dask_the_line_says_which_extra_to_install(refused, monkeypatch):
+    monkeypatch.setitem(sys.modules, "distributed", None)
+    assert 'pip install "atg-fg[cluster]"' in refused("table1", "--executor", "dask://localhost:1")
+
+
+def test_the_log_of_other_tests_is_refused(run, refused, tmp_path):
+    command = ["figure3", "--actions", "2", "--tests", "1", "--trials", "2", "--jobs", "1", "--log", tmp_path / "log"]
+    assert run(*command)[0] == 0
+    assert "expected the log of a Figure 3 with such tests" in refused(*command, "--slip", "0.1")
