@@ -53,6 +53,14 @@ def workers(address, folder, number=2):
         process.wait()
 
 
+def n_workers(address):
+    """Return how many workers a scheduler has."""
+    import distributed
+
+    with distributed.Client(address.replace("dask://", "tcp://"), set_as_default=False) as client:
+        return len(client.scheduler_info()["workers"])
+
+
 def wait_for(condition, seconds=60):
     """Wait until a condition holds and return what it gives."""
     end = time.monotonic() + seconds

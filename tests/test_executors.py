@@ -10,22 +10,6 @@ from atg_fg.executors import check_executor, run_pieces
 from tests import dask_cluster, pieces
 
 
-@pytest.fixture(scope="module")
-def dask_address(tmp_path_factory):
-    pytest.importorskip("distributed")
-    folder = tmp_path_factory.mktemp("dask")
-    with dask_cluster.scheduler(folder) as (_, address), dask_cluster.workers(address, folder):
-        dask_cluster.wait_for(lambda: n_workers(address) == 2)
-        yield address
-
-
-def n_workers(address):
-    import distributed
-
-    with distributed.Client(address.replace("dask://", "tcp://"), set_as_default=False) as client:
-        return len(client.scheduler_info()["workers"])
-
-
 @pytest.fixture(params=["process", "thread", "dask"])
 def executor(request):
     return request.getfixturevalue("dask_address") if request.param == "dask" else request.param
