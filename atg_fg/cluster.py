@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import sys
 from collections.abc import Callable
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
@@ -42,11 +43,15 @@ class Cluster:
         with ThreadPoolExecutor(1) as pool:
             pool.submit(asyncio.run, _check_scheduler(distributed, address, url)).result()
         self._client = distributed.Client(url, timeout=PATIENCE, set_as_default=False)
+        # When the scheduler dies, dask tells of each attempt to find it again; the error here says it once.
+        self._log = logging.getLogger("distributed")
+        self._level = self._log.level
+        self._log.setLevel(logging.CRITICAL)
         try:
             self._check_workers()
             self._executor = self._client.get_executor(pure=False)
         except BaseException:
-            self._client.close()
+            self.close()
             raise
 
     def _check_workers(self) -> None:
@@ -84,11 +89,14 @@ class Cluster:
         except self._killed as error:
             raise WorkerLostError(f"{error}") from error
         except CancelledError as error:
-            raise WorkerLostError(f"executor {self._address!r} is gone; expected it to stay") from error
+            raise WorkerLostError(
+                f"executor {self._address!r}: the scheduler is gone; expected it to stay until the end"
+            ) from error
 
     def close(self) -> None:
         """Leave the cluster; pieces that were not begun are given up, others end there with nobody to tell."""
         self._client.close()
+        self._log.setLevel(self._level)
 
 
 async def _check_scheduler(distributed: Any, address: str, url: str) -> None:

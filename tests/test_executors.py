@@ -1,5 +1,6 @@
 import os
 import sys
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
@@ -124,3 +125,20 @@ class TestCluster:
         monkeypatch.setitem(sys.modules, "distributed", None)
         with pytest.raises(MissingDependencyError, match=r"dask is not installed.*atg-fg\[cluster\]"):
             run_pieces(pieces.square, [1], "dask://127.0.0.1:1")
+
+    def test_a_scheduler_that_dies_is_one_clear_error(self, tmp_path, capfd):
+        pytest.importorskip("distributed")
+        with dask_cluster.scheduler(tmp_path) as (process, address), dask_cluster.workers(address, tmp_path, 1):
+            dask_cluster.wait_for(lambda: dask_cluster.n_workers(address) == 1)
+            capfd.readouterr()
+            with ThreadPoolExecutor(1) as pool:
+                pool.submit(kill_when_begun, process, tmp_path)
+                # The other pieces that it waits for never come.
+                with pytest.raises(WorkerLostError, match="the scheduler is gone"):
+                    run_pieces(pieces.waits_for_the_first, [(str(tmp_path), 0)], address)
+        assert capfd.readouterr() == ("", "")
+
+
+def kill_when_begun(process, folder):
+    dask_cluster.wait_for(lambda: pieces.times_begun(folder, 0))
+    process.kill()
