@@ -13,7 +13,7 @@ from atg_fg.trial_log import read_trials
 from tests.dask_cluster import ROOT, wait_for
 
 #: Two tests that take long enough to be met in the middle, even on a quick machine.
-TABLE1 = ["table1", "--engine", "gtsam", "--tests", "2", "--trials", "12", "--actions", "4"]
+TABLE1 = ["table1", "--engine", "gtsam", "--tests", "2", "--trials", "20", "--actions", "4"]
 FIGURE3 = ["figure3", "--actions", "2:5", "--tests", "3", "--trials", "40"]
 ABLATION = ["ablation", "--variants", "paper;learned", "--noises", "ideal", "--actions", "2,3", "--tests", "2"]
 ABLATION += ["--trials", "5"]
