@@ -12,6 +12,7 @@ from atg_fg.engines.enumeration import Enumeration
 from atg_fg.engines.gibbs_sampling import GibbsSampling
 from atg_fg.engines.gtsam_elimination import GtsamElimination
 from atg_fg.engines.gtsam_routes import GtsamMarginals, GtsamMultifrontal, GtsamSequential
+from atg_fg.engines.large_memory import LargeMemory
 from atg_fg.engines.learned_structure import LearnedStructure
 from atg_fg.engines.loopy_belief_propagation import LoopyBeliefPropagation
 from atg_fg.engines.mean_field import MeanField
@@ -35,6 +36,7 @@ ENGINES: Final[dict[str, type[Inference]]] = {
         GibbsSampling,
         MeanField,
         LearnedStructure,
+        LargeMemory,
     )
 }
 

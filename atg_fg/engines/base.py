@@ -38,8 +38,12 @@ class Inference(ABC):
         self.memory = memory
         self.parameters = parameters
         self.prior = prior
-        self.model = RecognitionModel(memory, parameters, prior)
+        self.model = self._tables()
         self.history = History()
+
+    def _tables(self) -> RecognitionModel:
+        """Return the tables in force when the trial begins; an engine that does without some of them overrides this."""
+        return RecognitionModel(self.memory, self.parameters, self.prior)
 
     def observe(self, evidence: Evidence) -> None:
         """Take in the evidence z_t of a look, then learn from it if the parameters say so.
@@ -51,7 +55,7 @@ class Inference(ABC):
         if not self.history.awaits_evidence:
             raise InvalidInputError("trial: two observations in a row; expected an action between them")
         evidence.check(self.model.n_patterns)
-        self._update(self.model.likelihood(evidence))
+        self._look(evidence)
         self.history.evidence.append(evidence)
         revelation = self.history.learn(self.model)
         if revelation is not None:
@@ -131,6 +135,11 @@ class Inference(ABC):
         """Return ln p(z_0:t | a_1:t)."""
 
     @property
+    def total_variation_bound(self) -> float | None:
+        """A bound of ½ Σ |p(O) − q(O)| to the exact posterior, 0 of exact engines; ``None`` if the engine has none."""
+        return 0.0 if self.exact else None
+
+    @property
     def aspect_belief(self) -> FloatArray:
         """p(O, X_t | z_0:t, a_1:t), shape [H, W]; after an action X_t is the aspect that it leads to."""
         if not self.history.evidence:
@@ -169,6 +178,10 @@ class Inference(ABC):
     @abstractmethod
     def _smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
         """Return ``smoothed_aspects``, or zeros, of a hypothesis that there is."""
+
+    def _look(self, evidence: Evidence) -> None:
+        """Condition on a look; raise before any change if it is impossible."""
+        self._update(self.model.likelihood(evidence))
 
     @abstractmethod
     def _update(self, likelihood: FloatArray) -> None:
