@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, Final, NamedTuple
 
 import numpy as np
 
@@ -13,13 +13,17 @@ from atg_fg.engines.bayes_filter import forward_backward
 from atg_fg.engines.options import whole_number
 from atg_fg.large_memory.aspect_filter import AspectFilter
 from atg_fg.large_memory.compact_memory import CompactMemory, GraphArrays
-from atg_fg.large_memory.decision import entropy_bound, expected_entropy, is_decided
+from atg_fg.large_memory.decision import by_class, entropy_bound, expected_entropies, is_decided, one_by_one
 from atg_fg.large_memory.never_matched import ClassMasses, NeverMatched
 from atg_fg.large_memory.tables_on_demand import TablesOnDemand
 from atg_fg.memory import RobotMemory
 from atg_fg.model import Revelation
 from atg_fg.parameters import ModelParameters
 from atg_fg.patterns import Evidence, FloatArray, IntArray
+
+
+#: So few objects are not worth an approximation.
+FEW: Final = 1000
 
 
 class Decision(NamedTuple):
@@ -213,32 +217,27 @@ class LargeMemory(Inference):
     def _decide(self) -> Decision:
         """Return the expected entropies after the last look: of all objects one by one where they have to be."""
         if self._decision is None:
-            self._decision = self._decide_by_classes()
+            self._decision = self._decide_anew()
         return self._decision
 
-    def _decide_by_classes(self) -> Decision:
-        classes = self._classes
+    def _decide_anew(self) -> Decision:
+        weights = np.exp(self._matched.log_weight - self._log_total)
+        classes, n_unseen = self._classes, self.model.n_unseen
+        unseen = float(weights[0])
         if classes is None:
-            return Decision(self._entropies(self._matched, self._log_total), 0.0, fell_back=False)
-        masses = self._masses()
-        expected = self._entropies(self._matched, self._log_total, classes, masses)
-        n_objects = len(self._compact) + self.model.n_unseen
-        bound = entropy_bound(float(classes.members @ masses.unsure_states), n_objects)
-        if is_decided(expected, bound):
-            return Decision(expected, bound, fell_back=False)
+            parts = [one_by_one(self._matched, weights, exact=True)]
+            return Decision(expected_entropies(parts, unseen, n_unseen), 0.0, fell_back=False)
+        of_classes = by_class(classes, self._masses())
+        for exact in (True,) if len(weights) <= FEW else (False, True):
+            parts = [one_by_one(self._matched, weights, exact=exact), of_classes]
+            expected = expected_entropies(parts, unseen, n_unseen)
+            bound = entropy_bound(sum(part.unsure for part in parts), len(self._compact) + n_unseen)
+            if is_decided(expected, bound):
+                return Decision(expected, bound, fell_back=False)
         everything = self._filter_of_all()
-        return Decision(self._entropies(everything, log_sum_exp(everything.log_weight)), 0.0, fell_back=True)
-
-    def _entropies(
-        self,
-        matched: AspectFilter,
-        log_total: float,
-        classes: NeverMatched | None = None,
-        masses: ClassMasses | None = None,
-    ) -> FloatArray:
-        weights, log_n_unseen = np.exp(matched.log_weight - log_total), float(np.log(self.model.n_unseen))
-        actions = range(self.model.n_actions)
-        return np.array([expected_entropy(a, matched, weights, classes, masses, log_n_unseen) for a in actions])
+        weights = np.exp(everything.log_weight - log_sum_exp(everything.log_weight))
+        parts = [one_by_one(everything, weights, exact=True)]
+        return Decision(expected_entropies(parts, float(weights[0]), n_unseen), 0.0, fell_back=True)
 
     def _filter_of_all(self) -> AspectFilter:
         """Return the exact filter of all objects after the last look; it is kept, and goes on from where it was."""

@@ -36,7 +36,7 @@ class Hidden(NamedTuple):
 
 
 class CountedEdges(NamedTuple):
-    """Counted transitions of all rows under one action; a cell is row · W + state. All arrays of shape [E]."""
+    """Counted transitions of all rows under one action, each once; a cell is row · W + state. All of shape [E]."""
 
     source: IntArray
     target: IntArray
@@ -83,7 +83,9 @@ class AspectFilter:
 
     Attributes:
         n_known: n of each row, the hidden ones included, shape [R].
-        pattern: Pattern of each listed aspect, shape [R, W]; −1 for collection nodes and padding.
+        listed_rows: Row of each listed aspect, shape [L].
+        listed_patterns: Pattern of each listed aspect, shape [L].
+        pattern: The same by state, shape [R, W]; −1 for collection nodes and padding.
         mass: p(X_t | row), shape [R, W].
         hidden_mass: p(X_t is hidden | row), shape [R].
         log_weight: ln p(row, z_0:t), shape [R].
@@ -110,6 +112,8 @@ class AspectFilter:
         self.pattern = np.full((n_rows, width), -1, dtype=np.int32)
         states = positions(np.arange(n_rows) * width + 1, listed)
         self.pattern.ravel()[states] = graphs.patterns
+        self.listed_rows = np.repeat(np.arange(n_rows), listed)
+        self.listed_patterns = graphs.patterns.astype(np.int64)
         self.mass = np.where(self.pattern >= 0, 1.0 / self.n_aspects, 0.0)
         self.mass[:, COLLECTION] = self.n_unobserved / self.n_aspects
         self.hidden_mass = self.hidden.number / self.n_aspects
@@ -224,6 +228,8 @@ class AspectFilter:
         states = self.n_known[rows] - self.hidden.number[rows].astype(np.int64)
         self._widen(int(states.max()) + 1)
         self.pattern[rows, states] = pattern
+        self.listed_rows = np.append(self.listed_rows, rows)
+        self.listed_patterns = np.append(self.listed_patterns, np.full(len(rows), pattern))
         revealed = self.mass[rows, COLLECTION] * shares
         self.mass[rows, states] = revealed
         self.mass[rows, COLLECTION] -= revealed
@@ -244,16 +250,21 @@ class AspectFilter:
         source_of, target_of = (self._cells_showing(shown) for shown in (previous, pattern))
         rows = np.flatnonzero((source_of >= 0) & (target_of >= 0))
         source, target = source_of[rows], target_of[rows]
-        old = self.edges[action]
+        edges = self.edges[action]
         touched = np.zeros(n_cells, dtype=bool)
         touched[source] = True
-        theirs = np.flatnonzero(touched[old.source])
-        totals = np.bincount(old.source[theirs], old.count[theirs], n_cells).astype(np.float64)
-        totals[source] += 1.0
-        old.probability[theirs] = old.count[theirs] / (totals[old.source[theirs]] + alpha)
+        theirs = np.flatnonzero(touched[edges.source])
+        again = theirs[edges.target[theirs] == target_of[edges.source[theirs] // self.width]]
+        edges.count[again] += 1.0
+        totals = np.bincount(edges.source[theirs], edges.count[theirs], n_cells).astype(np.float64)
+        touched[edges.source[again]] = False
+        new = touched[source]
+        totals[source[new]] += 1.0
+        edges.probability[theirs] = edges.count[theirs] / (totals[edges.source[theirs]] + alpha)
         self.stay[action].ravel()[source] = alpha / (totals[source] + alpha)
-        one = np.ones(len(rows))
-        self.edges[action] = old.followed_by(CountedEdges(source, target, one, one / (totals[source] + alpha)))
+        first = source[new]
+        added = CountedEdges(first, target[new], np.ones(len(first)), 1.0 / (totals[first] + alpha))
+        self.edges[action] = edges.followed_by(added)
 
     def _cells_showing(self, pattern: int) -> IntArray:
         """Return the cell of each row that shows a pattern, −1 if none does, shape [R]."""
@@ -285,7 +296,8 @@ class AspectFilter:
         self._widen(width)
         other._widen(width)
         first_row = self.n_rows
-        for name in ("n_known", "pattern", "mass", "hidden_mass", "log_weight"):
+        other.listed_rows = other.listed_rows + first_row
+        for name in ("listed_rows", "listed_patterns", "n_known", "pattern", "mass", "hidden_mass", "log_weight"):
             setattr(self, name, np.concatenate((getattr(self, name), getattr(other, name))))
         self.hidden = Hidden(*(np.concatenate(pair) for pair in zip(self.hidden, other.hidden, strict=True)))
         self.stay = np.concatenate((self.stay, other.stay), axis=1)

@@ -114,15 +114,16 @@ class NeverMatched:
             unsure_states + hidden[:half],
         )
 
-    def kept(self, masses: ClassMasses, action: int) -> FloatArray:
-        """Return S of one object of each class under an action, shape [C]; its edges among hidden aspects left out."""
-        listed: FloatArray = (masses.mass * self.filter.stay[action, : self.n_classes]).sum(axis=1)
+    def kept(self, masses: ClassMasses) -> FloatArray:
+        """Return S of one object of each class under each action, [A, C]; its edges among hidden aspects left out."""
+        listed: FloatArray = np.einsum("cw,acw->ac", masses.mass, self.filter.stay[:, : self.n_classes])
         return listed + masses.hidden
 
-    def arrivals(self, masses: ClassMasses, action: int) -> FloatArray:
-        """Return what edges counted in the trial carry to each aspect found in it, shape [C, W]."""
+    def arrivals(self, masses: ClassMasses) -> FloatArray:
+        """Return what edges counted in the trial carry to each aspect found in it, shape [A, C, W]."""
         padded = np.concatenate((masses.mass, np.zeros_like(masses.mass)))
-        return self.filter.arrivals(action, padded)[: self.n_classes]
+        actions = range(len(self.filter.edges))
+        return np.stack([self.filter.arrivals(action, padded)[: self.n_classes] for action in actions])
 
     @property
     def shown(self) -> IntArray:
