@@ -157,6 +157,9 @@ def _entry(number: int, inference: Inference, *, observed: bool) -> dict[str, An
         entry["expected_entropy"] = dict(zip(actions, expected.tolist(), strict=True))
         entry["best_actions"] = [actions[action] for action in best_actions(expected)]
     entry["log_evidence"] = inference.log_evidence
+    bound = inference.total_variation_bound
+    if not inference.exact and bound is not None:
+        entry["total_variation_bound"] = bound
     return entry
 
 

@@ -35,6 +35,7 @@ class TrialStep:
         action: Index of the action chosen next; ``None`` at the end of the trial.
         truth: What the world's ``info`` said, for scoring only.
         purpose: What the action is for, or why the policy ended the trial, if the policy says so.
+        total_variation_bound: How far the belief may be from exact, if the engine is not but has a bound.
     """
 
     detection: Detection
@@ -45,6 +46,7 @@ class TrialStep:
     expected_entropies: FloatArray | None = None
     action: int | None = None
     purpose: str | None = None
+    total_variation_bound: float | None = None
 
 
 @dataclass
@@ -113,6 +115,7 @@ class TrialRecord:
 
     def _step_line(self, time: int) -> dict[str, Any]:
         step, actions = self.steps[time], self.assumptions.actions
+        bound = step.total_variation_bound
         expected = step.expected_entropies
         return {
             "step": time,
@@ -124,6 +127,7 @@ class TrialRecord:
             "expected_entropy": None if expected is None else dict(zip(actions, expected.tolist(), strict=True)),
             "action": None if step.action is None else actions[step.action],
             **({} if step.purpose is None else {"purpose": step.purpose}),
+            **({} if bound is None else {"total_variation_bound": bound}),
             "truth": step.truth,
         }
 
@@ -194,6 +198,7 @@ def run_trial(
             choice.expected_entropies if choice else None,
             choice.action if choice else None,
             choice.purpose if choice else None,
+            None if inference.exact else inference.total_variation_bound,
         )
         record.steps.append(step)
         if on_step is not None:

@@ -7,15 +7,10 @@ each. Times are of the processor, medians over trials; memories take turns, so a
 
 from __future__ import annotations
 
-import argparse
-import statistics
 import time
-from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from rich.console import Console
-from rich.table import Table
 
 from atg_fg.arcube import ACTION_SOURCES
 from atg_fg.assumptions import Assumptions
@@ -117,7 +112,9 @@ def arcubes(n_objects: int, n_trials: int = 5, n_looks: int = 10) -> Presented:
     return Presented(memory, list(zip(patterns, actions, strict=True)))
 
 
-def timed_trial(memory: CompactMemory, patterns: IntArray, actions: IntArray) -> tuple[list[float], list[float], Inference]:
+def timed_trial(
+    memory: CompactMemory, patterns: IntArray, actions: IntArray
+) -> tuple[list[float], list[float], Inference]:
     """Return the seconds of each decision and of each update of a trial, and the engine after it."""
     inference = begin_trial("large-memory", memory, preset("default"), n_exact=0)
     alphabet = memory.assumptions.alphabet

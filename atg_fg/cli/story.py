@@ -37,6 +37,8 @@ class Story:
             bar = "█" * round(_BAR * probability)
             self.console.print(f"    {name:<12} {probability:6.1%} {bar}")
         self.console.print(f"    entropy of identity {step.belief.entropy:.3f} nats")
+        if step.total_variation_bound is not None:
+            self.console.print(f"    off by a total variation of at most {step.total_variation_bound:.1e}")
         if step.action is not None:
             chosen = self.assumptions.actions[step.action]
             self.console.print(f"  → {chosen}{self._reasons(step)}")

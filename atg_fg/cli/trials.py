@@ -18,6 +18,7 @@ from atg_fg.cli import options
 from atg_fg.cli.story import Story
 from atg_fg.engines import begin_trial
 from atg_fg.experiments import learn_from
+from atg_fg.large_memory.files import load_any_memory, save_any_memory
 from atg_fg.memory import RobotMemory
 from atg_fg.policies import make_policy
 from atg_fg.presets import preset as preset_named
@@ -38,7 +39,9 @@ def trial(
     policy: options.Policy = "entropy",
     actions: options.Actions = 10,
     settled: options.Settled = None,
-    memory: Annotated[Path | None, typer.Option(help="Memory file to start from; empty if not given.")] = None,
+    memory: Annotated[
+        Path | None, typer.Option(help="Memory file (JSON, or .npz) to start from; empty if not given.")
+    ] = None,
     save_memory: Annotated[
         Path | None, typer.Option(help="Save the memory with what was learned to this file.")
     ] = None,
@@ -66,7 +69,7 @@ def trial(
     chosen_policy = make_policy(policy, settled)
     parameters = preset_named(preset)
     engine = options.engine_of(engine, parameters, "gtsam")
-    loaded = store.load_memory(memory) if memory else None
+    loaded = load_any_memory(memory) if memory else None
     world_options = options.world_options(slip, wrong, missing, condition, urdf)
     with closing(make_world_with(world, N_OBJECTS, cubes_seed, **world_options)) as made_world:
         empty = RobotMemory(assumptions_of(made_world, N_OBJECTS))
@@ -84,7 +87,7 @@ def trial(
     if record is not None:
         store.write_bytes_atomically(record, lines.encode())
     if save_memory is not None:
-        store.save_memory(remembered, save_memory)
+        save_any_memory(remembered, save_memory)
     steps = [json.loads(line) for line in lines.splitlines()[1:-1]]
     document = {
         "command": "trial",

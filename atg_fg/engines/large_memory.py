@@ -1,4 +1,4 @@
-"""Recognition among a hundred thousand remembered objects and more: exact where a pattern matched, bounded elsewhere."""
+"""Recognition among a hundred thousand remembered objects: exact where a pattern matched, bounded elsewhere."""
 
 from __future__ import annotations
 
@@ -20,7 +20,6 @@ from atg_fg.memory import RobotMemory
 from atg_fg.model import Revelation
 from atg_fg.parameters import ModelParameters
 from atg_fg.patterns import Evidence, FloatArray, IntArray
-
 
 #: So few objects are not worth an approximation.
 FEW: Final = 1000

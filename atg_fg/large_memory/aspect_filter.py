@@ -40,7 +40,7 @@ class CountedEdges(NamedTuple):
 
     source: IntArray
     target: IntArray
-    count: FloatArray
+    counts: FloatArray
     probability: FloatArray
 
     def followed_by(self, other: CountedEdges) -> CountedEdges:
@@ -51,10 +51,8 @@ class CountedEdges(NamedTuple):
         """Return the same edges where rows are ``new_width`` wide and begin at another one."""
         if width == new_width and not first_row:
             return self
-        shifted = [
-            (cells // width + first_row) * new_width + cells % width for cells in (self.source, self.target)
-        ]
-        return CountedEdges(*shifted, self.count, self.probability)
+        source, target = ((cells // width + first_row) * new_width + cells % width for cells in self[:2])
+        return CountedEdges(source, target, self.counts, self.probability)
 
 
 class Looked(NamedTuple):
@@ -123,7 +121,7 @@ class AspectFilter:
         alpha, width = self.parameters.transition_concentration, self.width
         rows = np.repeat(np.arange(self.n_rows), graphs.n_edges.astype(np.int64))
         source, target = rows * width + graphs.source + 1, rows * width + graphs.target + 1
-        count = graphs.count.astype(np.float64)
+        count = graphs.counts.astype(np.float64)
         self.stay = np.ones((n_actions, self.n_rows, width))
         self.edges: list[CountedEdges] = []
         for action in range(n_actions):
@@ -255,12 +253,12 @@ class AspectFilter:
         touched[source] = True
         theirs = np.flatnonzero(touched[edges.source])
         again = theirs[edges.target[theirs] == target_of[edges.source[theirs] // self.width]]
-        edges.count[again] += 1.0
-        totals = np.bincount(edges.source[theirs], edges.count[theirs], n_cells).astype(np.float64)
+        edges.counts[again] += 1.0
+        totals = np.bincount(edges.source[theirs], edges.counts[theirs], n_cells).astype(np.float64)
         touched[edges.source[again]] = False
         new = touched[source]
         totals[source[new]] += 1.0
-        edges.probability[theirs] = edges.count[theirs] / (totals[edges.source[theirs]] + alpha)
+        edges.probability[theirs] = edges.counts[theirs] / (totals[edges.source[theirs]] + alpha)
         self.stay[action].ravel()[source] = alpha / (totals[source] + alpha)
         first = source[new]
         added = CountedEdges(first, target[new], np.ones(len(first)), 1.0 / (totals[first] + alpha))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import DTypeLike, NDArray
+from numpy.typing import NDArray
 
 from atg_fg.patterns import IntArray
 
@@ -61,7 +61,7 @@ class Column:
         return Column(self.values.copy())
 
 
-def least_type(greatest: int) -> DTypeLike:
+def least_type(greatest: int) -> type[np.integer[Any]]:
     """Return the least unsigned type that holds ``greatest``, int64 above 2^32 − 1."""
     for kind in (np.uint8, np.uint16, np.uint32):
         if greatest <= np.iinfo(kind).max:

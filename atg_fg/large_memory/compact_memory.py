@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from typing import NamedTuple, NoReturn
+from typing import Any, NamedTuple, NoReturn
 
 import numpy as np
 
@@ -28,7 +28,7 @@ class GraphArrays(NamedTuple):
         source: Aspect, counted within its ATG, that each transition leads from, shape [E].
         action: Its action, shape [E].
         target: Aspect that it leads to, shape [E].
-        count: How often it was seen, shape [E].
+        counts: How often it was seen, shape [E].
     """
 
     n_known: AnyIntArray
@@ -37,7 +37,7 @@ class GraphArrays(NamedTuple):
     source: AnyIntArray
     action: AnyIntArray
     target: AnyIntArray
-    count: AnyIntArray
+    counts: AnyIntArray
 
 
 class CompactMemory(RobotMemory):
@@ -115,7 +115,7 @@ class CompactMemory(RobotMemory):
 
     @property
     def n_known(self) -> AnyIntArray:
-        """n of each object, shape [K]."""
+        """N of each object, shape [K]."""
         return self._columns.n_known.values
 
     @property
@@ -219,7 +219,7 @@ class CompactMemory(RobotMemory):
         graph = AspectTransitionGraph(self._names[number], self.assumptions)
         for pattern in arrays.patterns.tolist():
             graph.add_aspect(self.assumptions.alphabet.patterns[pattern])
-        columns = (arrays.source, arrays.action, arrays.target, arrays.count)
+        columns = (arrays.source, arrays.action, arrays.target, arrays.counts)
         for edge in zip(*(column.tolist() for column in columns), strict=True):
             graph.add_transition(*edge)
         return graph
@@ -299,7 +299,7 @@ class GraphColumns:
             column.extend(part)
 
 
-def _types_of(assumptions: Assumptions) -> tuple[type[np.integer] | object, ...]:
+def _types_of(assumptions: Assumptions) -> tuple[type[np.integer[Any]], ...]:
     """Return the least types of n, patterns, edge numbers, sources, actions, targets and counts."""
     local = least_type(assumptions.n_aspects)
     actions = least_type(len(assumptions.actions))

@@ -102,7 +102,7 @@ def one_by_one(matched: AspectFilter, weights: FloatArray, *, exact: bool) -> Ne
         change[rows] = (now_known - now_unknown) - (known - unknown)[rows]
         predictive[action] += _by_listed(matched, change, rows) + (now_unknown - unknown[rows]).sum()
         gained = (1.0 - matched.parameters.observation_noise) * carried
-        predictive[action] += _sums(matched.pattern.ravel()[target], gained, matched.n_patterns)
+        predictive[action] += _sums(matched.pattern.ravel()[target].astype(np.int64), gained, matched.n_patterns)
         unreached = np.zeros(matched.n_rows)
         unreached[rows] = now_known
         without = unreached[here]
@@ -159,7 +159,7 @@ def _by_listed(matched: AspectFilter, change: FloatArray, rows: IntArray) -> Flo
         return _sums(matched.listed_patterns, change[matched.listed_rows], matched.n_patterns)
     shown = matched.pattern[rows]
     listed = shown >= 0
-    return _sums(shown[listed], np.repeat(change[rows], listed.sum(axis=1)), matched.n_patterns)
+    return _sums(shown[listed].astype(np.int64), np.repeat(change[rows], listed.sum(axis=1)), matched.n_patterns)
 
 
 def _sums(cells: IntArray, weights: FloatArray, n_cells: int) -> FloatArray:

@@ -132,7 +132,7 @@ class NeverMatched:
 
     @property
     def n_known(self) -> IntArray:
-        """n of an object of each class, with what it has learned in the trial, shape [C]."""
+        """N of an object of each class, with what it has learned in the trial, shape [C]."""
         return self.filter.n_known[: self.n_classes]
 
     def collection_share(self) -> FloatArray:
