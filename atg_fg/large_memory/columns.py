@@ -73,4 +73,5 @@ def positions(starts: IntArray, lengths: IntArray) -> IntArray:
     """Return start, start + 1, … of each of some pieces [P], one piece after the other, shape [Σ lengths]."""
     total = int(lengths.sum())
     first = np.cumsum(lengths) - lengths
-    return np.arange(total) + np.repeat(starts - first, lengths)
+    places: IntArray = np.arange(total) + np.repeat(starts - first, lengths)
+    return places
