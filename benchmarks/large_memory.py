@@ -9,9 +9,12 @@ all. How far the belief is from that of ``bayes-filter`` is measured with 10,000
 from __future__ import annotations
 
 import time
+from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
+from rich.console import Console
+from rich.table import Table
 
 from atg_fg.arcube import ACTION_SOURCES
 from atg_fg.assumptions import Assumptions

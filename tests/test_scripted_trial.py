@@ -96,6 +96,12 @@ def test_a_script_may_end_with_an_action():
         assert [step["step"] for step in document["smoothed"]["steps"]] == [0]
 
 
+def test_an_engine_with_a_bound_says_it_at_every_step():
+    for step in replay(script(), "large-memory")["steps"]:
+        assert step["total_variation_bound"] == 0
+    assert "total_variation_bound" not in replay(script(), "mean-field")["steps"][0]
+
+
 def test_smoothed_aspects_are_probabilities_of_the_likeliest_object():
     smoothed = replay(script(), "gtsam", smooth=True)["smoothed"]
     assert smoothed["object"] == "cube-000"

@@ -114,32 +114,21 @@ def _read_arrays(path: Path | str, place: str) -> dict[str, AnyIntArray]:
     """Return the arrays of a file by name: those of ``GraphArrays`` and the header, all of whole numbers."""
     expected = {"header", *GraphArrays._fields}
     try:
-        with np.load(path, allow_pickle=False) as file:
-            if not isinstance(file, np.lib.npyio.NpzFile) or set(file.files) != expected:
-                raise InvalidInputError(f"{place}: not a compact memory; expected arrays {', '.join(sorted(expected))}")
-            arrays = {name: file[name] for name in file.files}
-    except FileNotFoundError as error:
+        content = Path(path).read_bytes()
+    except OSError as error:
         raise InvalidInputError(f"{place}: cannot be read: {error.strerror}") from error
-    except (
-        OSError,
-        ValueError,
-        KeyError,
-        EOFError,
-        MemoryError,
-        OverflowError,
-        zipfile.BadZipFile,
-        zlib.error,
-    ) as error:
-        if isinstance(error, InvalidInputError):
-            raise
+    try:
+        file = np.load(io.BytesIO(content), allow_pickle=False)
+        found = set(file.files) if isinstance(file, np.lib.npyio.NpzFile) else set()
+        arrays: dict[str, AnyIntArray] = {name: file[name] for name in found}
+    except _UNSOUND as error:
         raise InvalidInputError(f"{place}: not a sound file of arrays: {error}") from error
-    except (SyntaxError, TypeError, NotImplementedError) as error:
-        raise InvalidInputError(f"{place}: not a sound file of arrays: {error}") from error
+    if found != expected:
+        raise InvalidInputError(f"{place}: not a compact memory; expected arrays {', '.join(sorted(expected))}")
     for name, array in arrays.items():
-        if array.ndim != 1 or array.dtype.kind not in "iu":
-            raise InvalidInputError(
-                f"{place}: {name}: {array.ndim} dimensions of {array.dtype}; expected one dimension of whole numbers"
-            )
+        if not isinstance(array, np.ndarray) or array.ndim != 1 or array.dtype.kind not in "iu":
+            kind = f"{array.ndim} dimensions of {array.dtype}" if isinstance(array, np.ndarray) else "no array"
+            raise InvalidInputError(f"{place}: {name}: {kind}; expected one dimension of whole numbers")
     return arrays
 
 

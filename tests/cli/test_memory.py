@@ -72,3 +72,31 @@ def test_duplicates_are_found_merged_and_taken_apart_again(run, refused, tmp_pat
     assert run("memory", "unmerge", file, "object-001")[0] == 0
     assert file.read_text() == before
     assert "threshold: nan" in refused("memory", "duplicates", file, "--threshold", "nan")
+
+
+def test_a_compact_memory_is_shown_checked_and_tried_as_any_other(run, refused, file, tmp_path):
+    arrays, record = tmp_path / "memory.npz", tmp_path / "trial.jsonl"
+    status, output, _ = run("memory", "compact", file, "--output", arrays)
+    assert (status, output.startswith(f"{arrays}: 1 ATGs")) == (0, True)
+    assert run("memory", "show", arrays, "--json", "-") == run("memory", "show", file, "--json", "-")
+    assert run("memory", "check", arrays)[:2] == (0, f"{arrays}: sound, 1 ATGs\n")
+    assert run("memory", "export", arrays) == run("memory", "export", file)
+    trial = ["trial", "--engine", "large-memory", "--actions", "2", "--record", record]
+    status, output, _ = run(*trial, "--memory", arrays, "--save-memory", arrays)
+    assert status == 0
+    assert "off by a total variation of at most" in output
+    assert json.loads(record.read_text().splitlines()[1])["total_variation_bound"] == 0
+    assert "2 ATGs" in run("memory", "check", arrays)[1]
+    assert "expected a name that ends in .npz" in refused("memory", "compact", file, "--output", tmp_path / "a.json")
+    arrays.write_bytes(b"")
+    assert "memory.npz: not a sound file of arrays" in refused("memory", "check", arrays)
+
+
+def test_only_atgs_go_into_a_compact_memory(refused, tmp_path):
+    memory = RobotMemory(arcube_assumptions())
+    for _ in range(2):
+        memory.learn([0, 1], [0], matched=None)
+    memory.merge("object-000", "object-001")
+    store.save_memory(memory, tmp_path / "memory.json")
+    error = refused("memory", "compact", tmp_path / "memory.json", "--output", tmp_path / "memory.npz")
+    assert "merges or a learned structure" in error
