@@ -16,7 +16,9 @@ from atg_fg import figures, store
 from atg_fg.cli import options
 from atg_fg.presets import write_preset
 
-app = typer.Typer(help="The simulated robot: reliability, calibration, pictures.", no_args_is_help=True)
+app = typer.Typer(
+    help="The simulated robot: reliability, calibration, pictures. Example: atg-fg sim picture", no_args_is_help=True
+)
 
 Condition = Annotated[str, typer.Option(help="What the robot works under: nominal or worn.")]
 Actions = Annotated[int, typer.Option(help="Number of random actions.")]

@@ -46,7 +46,10 @@ def _common(
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version.")
     ] = False,
 ) -> None:
-    """Recognise objects by acting on them: Aspect Transition Graphs as discrete factor graphs."""
+    """Recognise objects by acting on them: Aspect Transition Graphs as discrete factor graphs.
+
+    Example: atg-fg demo
+    """
 
 
 app.command()(demo.demo)

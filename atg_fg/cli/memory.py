@@ -20,7 +20,10 @@ from atg_fg.presets import preset as preset_named
 from atg_fg.structure.completion import completed_atg
 from atg_fg.structure.memory import StructuredMemory
 
-app = typer.Typer(help="Look at a saved robot memory, check it, export and merge its graphs.", no_args_is_help=True)
+app = typer.Typer(
+    help="Look at a saved robot memory, check it, export and merge its graphs. Example: atg-fg memory show memory.json",
+    no_args_is_help=True,
+)
 
 MemoryFile = Annotated[Path, typer.Argument(help="A memory file (JSON).", show_default=False)]
 AnyMemoryFile = Annotated[Path, typer.Argument(help="A memory file (JSON, or .npz).", show_default=False)]

@@ -20,7 +20,7 @@ from atg_fg.structure.memory import StructuredMemory
 from atg_fg.structure.structure_picture import draw_structure
 from atg_fg.structure.words import permutation_text, register_names
 
-app = typer.Typer(help="Look at the structure that a robot memory has learned.", no_args_is_help=True)
+app = typer.Typer(no_args_is_help=True)
 
 MemoryFile = Annotated[Path, typer.Argument(help="A memory file (JSON).", show_default=False)]
 
@@ -28,7 +28,10 @@ MemoryFile = Annotated[Path, typer.Argument(help="A memory file (JSON).", show_d
 # Without it typer would make the only command of the group the group itself.
 @app.callback()
 def group() -> None:
-    """Look at the structure that a robot memory has learned."""
+    """Look at the structure that a robot memory has learned.
+
+    Example: atg-fg structure show memory.json
+    """
 
 
 @app.command()

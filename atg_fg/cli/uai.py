@@ -17,7 +17,9 @@ from atg_fg.uai_export import export_trial
 from atg_fg.uai_format import DiscreteModel, read_evidence, read_model, write_evidence, write_model
 
 app = typer.Typer(
-    help="Solve discrete factor graphs in the UAI format, and write trials as such.", no_args_is_help=True
+    help="Solve discrete factor graphs in the UAI format, and write trials as such. "
+    "Example: atg-fg uai solve trial.uai --evidence trial.uai.evid",
+    no_args_is_help=True,
 )
 
 #: The line of a result, and the result as JSON has it.

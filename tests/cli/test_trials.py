@@ -104,13 +104,6 @@ def test_an_unknown_command_is_refused(refused):
     assert "No such command 'magic'" in refused("magic")
 
 
-@pytest.mark.parametrize("command", [[], ["table1"], ["figure3"], ["trial"], ["replay"], ["demo"], ["memory", "show"]])
-def test_help_of_every_command_carries_an_example(run, command):
-    status, output, _ = run(*command, "--help")
-    assert status == 0
-    assert not command or "Example: atg-fg" in output
-
-
 def test_structure_is_learned_from_trial_to_trial(run, tmp_path):
     file = tmp_path / "memory.json"
     assert run("trial", "--preset", "learned", "--save-memory", file)[0] == 0
