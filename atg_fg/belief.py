@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
 from atg_fg.errors import InvalidInputError
 from atg_fg.patterns import FloatArray
 
+#: Smallest normal number: x ln x of what is below it is zero up to rounding.
+_LEAST: Final = float(np.finfo(np.float64).tiny)
+
 
 def x_log_x(x: FloatArray) -> FloatArray:
     """Return x ln x, elementwise, with 0 ln 0 = 0."""
-    return x * np.log(x, out=np.zeros_like(x), where=x > 0)
+    # A logarithm of all elements is several times as quick as one of those that are positive.
+    return x * np.log(np.maximum(x, _LEAST))
 
 
 def log_of(x: FloatArray) -> FloatArray:

@@ -7,37 +7,47 @@ logarithm a known edge is enough where the sum over all objects and patterns has
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from atg_fg.belief import x_log_x
-from atg_fg.model import COLLECTION, RecognitionModel
+from atg_fg.model import RecognitionModel
 from atg_fg.patterns import FloatArray, IntArray
 
 
-class Targets(NamedTuple):
-    """The distinct (action, hypothesis, state) that a counted edge leads to, all arrays of shape [R]."""
-
-    action: IntArray
-    hypothesis: IntArray
-    state: IntArray
-
-
 class NextPatternJoint(NamedTuple):
-    """p(O = i, z_{t+1} | a, z_0:t) for a single pattern z of each kind; more axes are more beliefs.
+    """J = p(O = i, z_{t+1} | a, z_0:t) for a single pattern z of each kind; more axes are more beliefs.
 
     Attributes:
         unknown: For a pattern the object does not know, shape [..., A, H].
         unreached: For a pattern it knows and to which no counted edge leads, shape [..., A, H].
-        targets: The states that counted edges lead to.
-        reached: For the pattern of each target, shape [..., R].
+        reached: For the pattern of each of the model's targets, shape [..., R].
     """
 
     unknown: FloatArray
     unreached: FloatArray
-    targets: Targets
     reached: FloatArray
+
+    @classmethod
+    def of(cls, model: RecognitionModel, total: FloatArray, kept: FloatArray, arrived: FloatArray) -> NextPatternJoint:
+        """Return J from what becomes of the belief.
+
+        Args:
+            model: The tables in force.
+            total: p(O), shape [..., 1, H].
+            kept: The part that the transition rows leave to their base, shape [..., A, H].
+            arrived: The part that counted edges carry to each target, shape [..., R].
+        """
+        observed = 1.0 - model.parameters.observation_noise
+        noise = model.parameters.observation_noise / model.n_patterns * total
+        unreached = kept * (observed / model.n_aspects) + noise
+        return cls(
+            unknown=kept * model.unknown_share + noise,
+            unreached=unreached,
+            reached=_of_targets(model, unreached) + observed * arrived,
+        )
 
 
 def expected_entropies(model: RecognitionModel, joint: NextPatternJoint, unseen: float | FloatArray) -> FloatArray:
@@ -48,43 +58,47 @@ def expected_entropies(model: RecognitionModel, joint: NextPatternJoint, unseen:
         joint: J.
         unseen: p(unseen | z_0:t), a number or of shape [..., 1].
     """
-    targets = joint.targets
-    of_target = joint.unreached[..., targets.action, targets.hypothesis]
-    cells = targets.action * model.n_patterns + model.pattern_of[targets.hypothesis, targets.state]
-    shape = (*joint.unreached.shape[:-1], model.n_patterns)
-    flat = (-1, model.n_hypotheses)
-    predictive = joint.unknown.reshape(flat) @ model.unknown + joint.unreached.reshape(flat) @ model.known
-    predictive = predictive.reshape(shape)
-    predictive += sums(joint.reached - of_target, cells, shape[-2] * shape[-1]).reshape(shape)
-    # Subtracting may leave a rounding error below zero.
-    np.maximum(predictive, 0.0, out=predictive)
-
-    unreached = x_log_x(joint.unreached)
-    reached = x_log_x(joint.reached) - unreached[..., targets.action, targets.hypothesis]
+    predictive = _predictive(model, joint)
+    unreached, reached, unknown = x_log_x(joint.unreached), x_log_x(joint.reached), x_log_x(joint.unknown)
     joint_terms = (
-        unreached @ model.n_known
-        + x_log_x(joint.unknown) @ (model.n_patterns - model.n_known)
-        + sums(reached, targets.action, model.n_actions)
+        np.vecdot(unreached, model.n_unreached)
+        + unknown @ model.n_unknown
+        + _sums(reached, model.targets.action, model.n_actions)
     )
     entropies: FloatArray = x_log_x(predictive).sum(axis=-1) - joint_terms + unseen * np.log(model.n_unseen)
     return np.maximum(entropies, 0.0)
 
 
-def sums(weights: FloatArray, cells: IntArray, n_cells: int) -> FloatArray:
+def _predictive(model: RecognitionModel, joint: NextPatternJoint) -> FloatArray:
+    """Return p(z | a), shape [..., A, |𝒵|]: as if all objects knew none, and what it is more where they know it."""
+    unknown, unreached, reached = joint
+    predictive = unknown.sum(axis=-1)[..., None] + (unreached - unknown) @ model.known
+    excess = _sums(reached - _of_targets(model, unreached), model.targets.pattern, model.n_actions * model.n_patterns)
+    predictive += excess.reshape(predictive.shape)
+    # Subtracting may leave a rounding error below zero.
+    nowhere_negative: FloatArray = np.maximum(predictive, 0.0)
+    return nowhere_negative
+
+
+def _of_targets(model: RecognitionModel, values: FloatArray) -> FloatArray:
+    """Return those of ``values`` [..., A, H] that are of the action and hypothesis of each target, [..., R]."""
+    flat = values.reshape(*values.shape[:-2], -1)
+    return flat.take(model.targets.row, axis=-1)
+
+
+def _sums(weights: FloatArray, cells: IntArray, n_cells: int) -> FloatArray:
     """Return the sum of all ``weights`` [..., R] whose cell, ``cells`` [R], is the same, shape [..., n_cells]."""
-    n_rows = int(np.prod(weights.shape[:-1]))
-    everywhere = (n_cells * np.arange(n_rows)[:, None] + cells).ravel()
-    summed = np.bincount(everywhere, weights=weights.ravel(), minlength=n_rows * n_cells)
-    return summed.astype(np.float64).reshape(*weights.shape[:-1], n_cells)
+    n_rows = math.prod(weights.shape[:-1])
+    if n_rows > 1:
+        cells = (n_cells * np.arange(n_rows)[:, None] + cells).ravel()
+    summed: FloatArray = np.bincount(cells, weights=weights.ravel(), minlength=n_rows * n_cells).astype(np.float64)
+    return summed.reshape(*weights.shape[:-1], n_cells)
 
 
-def edge_arrivals(model: RecognitionModel, mass: FloatArray) -> FloatArray:
-    """Return the part of ``mass`` [H, W] that counted edges carry to each state under each action, [A, H, W]."""
-    edges = model.edges
-    shape = (model.n_actions, model.n_hypotheses, model.n_states)
-    carried = mass[edges.hypothesis, edges.source] * model.edge_probability
-    arrivals = np.bincount(model.edge_cells, weights=carried, minlength=int(np.prod(shape)))
-    return arrivals.astype(np.float64).reshape(shape)
+def arrivals(model: RecognitionModel, mass: FloatArray) -> FloatArray:
+    """Return the part of ``mass`` [H, W] that counted edges carry to each of the model's targets, shape [R]."""
+    carried = mass.ravel()[model.edge_source] * model.edge_probability
+    return _sums(carried, model.edge_target, len(model.targets.row))
 
 
 def next_pattern_joint(model: RecognitionModel, mass: FloatArray) -> NextPatternJoint:
@@ -94,19 +108,8 @@ def next_pattern_joint(model: RecognitionModel, mass: FloatArray) -> NextPattern
         model: The tables in force.
         mass: p(O, X_t | z_0:t), or an approximation of it, shape [H, W].
     """
-    observed = 1.0 - model.parameters.observation_noise
-    noise = model.parameters.observation_noise / model.n_patterns * mass.sum(axis=1)
-    kept = np.einsum("hx,ahx->ah", mass, model.stay)
-    unreached = kept * (observed / model.n_aspects) + noise
-    arrivals = edge_arrivals(model, mass)
-    reached = np.flatnonzero(arrivals)
-    targets = Targets(*np.unravel_index(reached, arrivals.shape))
-    return NextPatternJoint(
-        unknown=kept * model.base[:, COLLECTION] * model.unknown_rate + noise,
-        unreached=unreached,
-        targets=targets,
-        reached=unreached[targets.action, targets.hypothesis] + observed * arrivals.ravel()[reached],
-    )
+    kept = np.vecdot(mass, model.stay)
+    return NextPatternJoint.of(model, mass @ np.ones(model.n_states), kept, arrivals(model, mass))
 
 
 def pattern_table(model: RecognitionModel, joint: NextPatternJoint, hypotheses: IntArray) -> FloatArray:
@@ -117,7 +120,7 @@ def pattern_table(model: RecognitionModel, joint: NextPatternJoint, hypotheses: 
     )
     place = np.full(model.n_hypotheses, -1)
     place[hypotheses] = np.arange(len(hypotheses))
-    action, hypothesis, state = joint.targets
+    action, hypothesis, state = model.targets[:3]
     chosen = place[hypothesis] >= 0
     patterns = model.pattern_of[hypothesis, state][chosen]
     table[action[chosen], place[hypothesis[chosen]], patterns] = joint.reached[chosen]

@@ -6,10 +6,11 @@ from collections.abc import Iterable, Sequence
 from typing import TypeAlias
 
 import networkx
+import numpy as np
 
 from atg_fg.assumptions import MAX_NUMBER, Assumptions
 from atg_fg.errors import InvalidInputError
-from atg_fg.patterns import Pattern
+from atg_fg.patterns import IntArray, Pattern
 
 #: Node of the networkx view that stands for all unobserved aspects.
 COLLECTION_NODE = "collection"
@@ -35,6 +36,7 @@ class AspectTransitionGraph:
         self.assumptions = assumptions
         self._aspect_of: dict[int, int] = {}
         self._counts: dict[Edge, int] = {}
+        self._count_table: IntArray | None = None
 
     @property
     def n_known(self) -> int:
@@ -60,6 +62,21 @@ class AspectTransitionGraph:
     def counts(self) -> dict[Edge, int]:
         """c(x, a, y): how often each transition was observed."""
         return dict(self._counts)
+
+    @property
+    def n_counted(self) -> int:
+        """How many different transitions were observed."""
+        return len(self._counts)
+
+    @property
+    def count_table(self) -> IntArray:
+        """(source, action, target, count) of each observed transition, shape [E, 4]; not to be written to."""
+        if self._count_table is None:
+            # Every trial asks every graph for it, but teaches one of them.
+            rows = [(*edge, count) for edge, count in self._counts.items()]
+            self._count_table = np.array(rows, dtype=np.int64).reshape(-1, 4)
+            self._count_table.flags.writeable = False
+        return self._count_table
 
     def aspect_showing(self, pattern: int) -> int | None:
         """Return the known aspect that shows the pattern of this index, or ``None``."""
@@ -102,6 +119,7 @@ class AspectTransitionGraph:
             raise InvalidInputError(f"{self.name}: count {count!r}; expected a whole number from 1 to 2^53")
         edge = (source, action, target)
         self._counts[edge] = self._counts.get(edge, 0) + count
+        self._count_table = None
 
     def learn(self, patterns: Sequence[int | None], actions: Sequence[int]) -> None:
         """Extend the graph by what a trial showed.

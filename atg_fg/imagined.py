@@ -17,14 +17,7 @@ from typing import Final, Protocol
 import numpy as np
 
 from atg_fg.belief import x_log_x
-from atg_fg.expected_entropy import (
-    NextPatternJoint,
-    Targets,
-    edge_arrivals,
-    expected_entropies,
-    expected_entropies_of,
-    sums,
-)
+from atg_fg.expected_entropy import NextPatternJoint, arrivals, expected_entropies, expected_entropies_of
 from atg_fg.model import COLLECTION, RecognitionModel
 from atg_fg.patterns import FloatArray, IntArray
 
@@ -85,9 +78,7 @@ class TableBelief:
 
     def after(self, action: int) -> TableLooks:
         """Return what may be seen after an action."""
-        model = self._model
-        kept = (self._mass * model.stay[action]).sum(axis=1)
-        return TableLooks(model, kept[:, None] * model.base + edge_arrivals(model, self._mass)[action])
+        return TableLooks(self._model, self._model.predict(self._mass, action))
 
 
 class TableLooks:
@@ -138,17 +129,7 @@ class TableLooks:
     def expected_entropies(self, looks: IntArray) -> FloatArray:
         """Return the expected entropies after each of some looks [N] and one more action, in nats, shape [N, A]."""
         model = self._model
-        delta = model.parameters.observation_noise
-        noise = delta / model.n_patterns * self._joint[looks][:, None, :]
-        kept = self._kept(looks)
-        unreached = kept * ((1.0 - delta) / model.n_aspects) + noise
-        targets, arrivals = self._arrivals(looks)
-        joint = NextPatternJoint(
-            unknown=kept * (model.base[:, COLLECTION] * model.unknown_rate) + noise,
-            unreached=unreached,
-            targets=targets,
-            reached=unreached[:, targets.action, targets.hypothesis] + (1.0 - delta) * arrivals,
-        )
+        joint = NextPatternJoint.of(model, self._joint[looks][:, None, :], self._kept(looks), self._arrivals(looks))
         # Both sides are weighted by p(look | a): no belief is normalised.
         return expected_entropies(model, joint, self._joint[looks, -1][:, None]) / self.probabilities[looks][:, None]
 
@@ -167,18 +148,15 @@ class TableLooks:
         kept: FloatArray = self._share[looks][:, None, None] * shared + own
         return kept
 
-    def _arrivals(self, looks: IntArray) -> tuple[Targets, FloatArray]:
-        """Return where the next action's counted edges lead, and the mass they carry there, shape [N, R]."""
+    def _arrivals(self, looks: IntArray) -> FloatArray:
+        """Return the mass, with each look, that the next action's counted edges carry to each target, [N, R]."""
         model, edges = self._model, self._model.edges
-        shape = (model.n_actions, model.n_hypotheses, model.n_states)
-        cells, target = np.unique(model.edge_cells, return_inverse=True)
-        shared = sums(self._shared[edges.hypothesis, edges.source] * model.edge_probability, target, len(cells))
-        arrivals = self._share[looks][:, None] * shared
+        arrived: FloatArray = self._share[looks][:, None] * arrivals(model, self._shared)
         # A look's own mass is where its pattern is shown: it takes only the edges that leave that aspect.
         position = np.full(len(self._share), -1)
         position[looks] = np.arange(len(looks))
         look = self._look_of[model.pattern_of[edges.hypothesis, edges.source]]
         own = self._own[edges.hypothesis, look] * model.edge_probability
         asked = position[look] >= 0
-        np.add.at(arrivals, (position[look[asked]], target[asked]), own[asked])
-        return Targets(*np.unravel_index(cells, shape)), arrivals
+        np.add.at(arrived, (position[look[asked]], model.edge_target[asked]), own[asked])
+        return arrived

@@ -8,18 +8,29 @@ probability zero. A transition row is never stored: it is ``stay · base`` plus 
 
 from __future__ import annotations
 
+import math
 from copy import copy
-from typing import NamedTuple
+from itertools import chain
+from typing import Final, NamedTuple, TypeVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from atg_fg.belief import IdentityBelief
+from atg_fg.edges import Edges, Targets, distinct
 from atg_fg.memory import RobotMemory
 from atg_fg.parameters import ModelParameters
 from atg_fg.patterns import Evidence, FloatArray, IntArray
 
 #: State index of the collection node.
 COLLECTION = 0
+
+#: Attributes of a ``RecognitionModel`` whose first axis are its hypotheses.
+_BY_HYPOTHESIS: Final = (
+    *("prior", "n_known", "aspect_of", "pattern_of", "base", "known", "unknown", "n_unknown"),
+    *("unknown_rate", "unknown_share"),
+)
+_Number = TypeVar("_Number", np.float64, np.int64)
 
 
 class Revelation(NamedTuple):
@@ -40,26 +51,6 @@ class Revelation(NamedTuple):
         revealed = mass[..., self.hypotheses, COLLECTION] * self.shares
         mass[..., self.hypotheses, self.states] = revealed
         mass[..., self.hypotheses, COLLECTION] -= revealed
-
-
-class Edges(NamedTuple):
-    """Counted transitions of all hypotheses, all arrays of shape [E]; entries of one edge add up."""
-
-    action: IntArray
-    hypothesis: IntArray
-    source: IntArray
-    target: IntArray
-    weight: FloatArray
-
-    def followed_by(self, other: Edges) -> Edges:
-        """Return the entries of both."""
-        return Edges(
-            np.concatenate((self.action, other.action)),
-            np.concatenate((self.hypothesis, other.hypothesis)),
-            np.concatenate((self.source, other.source)),
-            np.concatenate((self.target, other.target)),
-            np.concatenate((self.weight, other.weight)),
-        )
 
 
 class RecognitionModel:
@@ -101,18 +92,18 @@ class RecognitionModel:
         self.n_known = np.array([graph.n_known for graph in graphs] + [0], dtype=np.int64)
         self.aspect_of = np.full((self.n_hypotheses, self.n_patterns), COLLECTION, dtype=np.int64)
         self.pattern_of = np.full((self.n_hypotheses, 1 + int(self.n_known.max())), -1, dtype=np.int64)
-        for hypothesis, graph in enumerate(graphs):
-            patterns = list(graph.pattern_indices)
-            self.pattern_of[hypothesis, 1 : 1 + len(patterns)] = patterns
-            self.aspect_of[hypothesis, patterns] = 1 + np.arange(len(patterns))
-        entries = [
-            (action, hypothesis, 1 + source, 1 + target, count)
-            for hypothesis, graph in enumerate(graphs)
-            for (source, action, target), count in graph.counts.items()
-        ]
-        columns = np.array(entries, dtype=np.int64).reshape(-1, 5).T
-        action, hypotheses, source, target, count = columns
-        self.edges = Edges(action, hypotheses, source, target, count.astype(np.float64))
+        patterns = np.fromiter(chain.from_iterable(graph.pattern_indices for graph in graphs), dtype=np.int64)
+        hypotheses = np.repeat(np.arange(self.n_hypotheses), self.n_known)
+        states = 1 + np.arange(len(patterns)) - np.repeat(np.cumsum(self.n_known) - self.n_known, self.n_known)
+        self.pattern_of[hypotheses, states] = patterns
+        self.aspect_of[hypotheses, patterns] = states
+        #: which patterns a hypothesis knows, and which not, as 1.0 and 0.0, shape [H, |𝒵|]
+        self.known = (self.aspect_of != COLLECTION).astype(np.float64)
+        self.unknown = 1.0 - self.known
+        owners = np.repeat(np.arange(len(graphs)), [graph.n_counted for graph in graphs])
+        columns = np.concatenate([np.empty((0, 4), dtype=np.int64), *(graph.count_table for graph in graphs)]).T
+        source, action, target, count = columns
+        self.edges = Edges(action, owners, 1 + source, 1 + target, count.astype(np.float64))
         self._refresh_aspects()
         self._refresh_transitions()
 
@@ -128,27 +119,41 @@ class RecognitionModel:
         #: p(next aspect) where nothing was counted, shape [H, W]
         self.base = np.where(self.pattern_of >= 0, 1.0 / self.n_aspects, 0.0)
         self.base[:, COLLECTION] = n_unobserved / self.n_aspects
-        #: which patterns a hypothesis knows, and which not, as 1.0 and 0.0, shape [H, |𝒵|]
-        self.known = (self.aspect_of != COLLECTION).astype(np.float64)
-        self.unknown = 1.0 - self.known
+        #: how many patterns a hypothesis does not know, shape [H]
+        self.n_unknown = (n_patterns - self.n_known).astype(np.float64)
         #: p(z | C_i) without noise of each pattern that no known aspect shows, shape [H]
-        n_unknown = np.maximum(n_patterns - self.n_known, 1)
-        self.unknown_rate = np.where(n_unobserved > 0, (1.0 - delta) / n_unknown, 0.0)
+        self.unknown_rate = np.where(n_unobserved > 0, (1.0 - delta) / np.maximum(self.n_unknown, 1.0), 0.0)
+        #: the same of the next look if nothing was counted, shape [H]
+        self.unknown_share = self.base[:, COLLECTION] * self.unknown_rate
 
     def _refresh_transitions(self) -> None:
         """Make everything that follows from the counted transitions."""
         alpha = self.parameters.transition_concentration
-        shape = (self.n_actions, self.n_hypotheses, self.n_states)
-        rows = np.ravel_multi_index((self.edges.action, self.edges.hypothesis, self.edges.source), shape)
-        totals = np.bincount(rows, weights=self.edges.weight, minlength=int(np.prod(shape))).astype(np.float64)
-        #: whether anything was counted in a transition row, shape [A, H, W]
-        self.counted = (totals > 0).reshape(shape)
+        edges, shape = self.edges, (self.n_actions, self.n_hypotheses, self.n_states)
+        rows = (edges.action * self.n_hypotheses + edges.hypothesis) * self.n_states + edges.source
+        totals = np.bincount(rows, weights=edges.weight, minlength=math.prod(shape))[rows] + alpha
         #: α / (c + α), the share of ``base`` in each transition row, shape [A, H, W]
-        self.stay = np.divide(alpha, totals + alpha, out=np.ones_like(totals), where=totals > 0).reshape(shape)
+        self.stay = np.ones(shape)
+        self.stay.ravel()[rows] = alpha / totals
         #: the rest of each row, divided over its edges, shape [E]
-        self.edge_probability = self.edges.weight / (totals[rows] + alpha)
-        #: flat index of each edge's (action, hypothesis, target), shape [E]
-        self.edge_cells = rows + (self.edges.target - self.edges.source)
+        self.edge_probability = edges.weight / totals
+        #: flat index of each edge's (hypothesis, source), shape [E]
+        self.edge_source = edges.hypothesis * self.n_states + edges.source
+        self._refresh_targets(rows + (edges.target - edges.source))
+
+    def _refresh_targets(self, cells: IntArray) -> None:
+        """Make everything that follows from the (action, hypothesis, target) of each edge, flat indices [E]."""
+        #: which target each edge leads to, shape [E]
+        self.edge_target, one_edge = distinct(cells, self.stay.size)
+        action, hypothesis, _, state, _ = self.edges.chosen(one_edge)
+        row = action * self.n_hypotheses + hypothesis
+        #: what edges lead to
+        self.targets = Targets(
+            action, hypothesis, state, row, action * self.n_patterns + self.pattern_of[hypothesis, state]
+        )
+        n_targets = np.bincount(row, minlength=self.n_actions * self.n_hypotheses).reshape(self.n_actions, -1)
+        #: how many known aspects of a hypothesis no edge of an action leads to, shape [A, H]
+        self.n_unreached = (self.n_known - n_targets).astype(np.float64)
 
     def transition(self, action: int) -> FloatArray:
         """Return p(x' | x, a, i) with its padding, shape [H, W, W]; see ``docs/model.md``."""
@@ -158,13 +163,22 @@ class RecognitionModel:
         np.add.at(table, where, self.edge_probability[chosen])
         return table
 
+    def predict(self, mass: FloatArray, action: int) -> FloatArray:
+        """Return Σ_x mass(i, x) p(x' | x, a, i), shape [H, W], from ``mass`` [H, W] without any transition table."""
+        chosen = self.edges.of_action(action)
+        targets = self.edges.hypothesis[chosen] * self.n_states + self.edges.target[chosen]
+        carried = mass.ravel()[self.edge_source[chosen]] * self.edge_probability[chosen]
+        arrived = np.bincount(targets, weights=carried, minlength=self.base.size).reshape(self.base.shape)
+        kept = np.vecdot(mass, self.stay[action])
+        predicted: FloatArray = kept[:, None] * self.base + arrived
+        return predicted
+
     def likelihood(self, evidence: Evidence) -> FloatArray:
         """Return p(evidence | x, i) = Σ_z evidence(z) p(z | x, i), shape [H, W]."""
         noise = self.parameters.observation_noise / self.n_patterns * evidence.likelihood.sum()
-        shown = evidence.likelihood[self.pattern_of]
-        table: FloatArray = (1.0 - self.parameters.observation_noise) * np.where(
-            self.pattern_of >= 0, shown, 0.0
-        ) + noise
+        shown = (1.0 - self.parameters.observation_noise) * evidence.likelihood + noise
+        # At index -1, the pattern of collection nodes and padding, there is noise alone.
+        table: FloatArray = np.append(shown, noise)[self.pattern_of]
         table[:, COLLECTION] = self.unknown_rate * (self.unknown @ evidence.likelihood) + noise
         return table
 
@@ -176,23 +190,18 @@ class RecognitionModel:
         """
         part = copy(self)
         part.n_hypotheses = len(hypotheses)
-        for name in ("prior", "n_known", "aspect_of", "pattern_of", "base", "known", "unknown", "unknown_rate"):
+        for name in _BY_HYPOTHESIS:
             setattr(part, name, getattr(self, name)[hypotheses])
-        part.counted, part.stay = self.counted[:, hypotheses], self.stay[:, hypotheses]
+        part.stay = self.stay[:, hypotheses]
         number = np.full(self.n_hypotheses, -1)
         number[hypotheses] = np.arange(len(hypotheses))
         kept = number[self.edges.hypothesis] >= 0
-        edges = self.edges
-        part.edges = Edges(
-            edges.action[kept],
-            number[edges.hypothesis[kept]],
-            edges.source[kept],
-            edges.target[kept],
-            edges.weight[kept],
-        )
+        part.edges = self.edges.chosen(kept)._replace(hypothesis=number[self.edges.hypothesis[kept]])
         part.edge_probability = self.edge_probability[kept]
-        shape = (part.n_actions, part.n_hypotheses, part.n_states)
-        part.edge_cells = np.ravel_multi_index((part.edges.action, part.edges.hypothesis, part.edges.target), shape)
+        part.edge_source = part.edges.hypothesis * part.n_states + part.edges.source
+        part._refresh_targets(
+            np.ravel_multi_index((part.edges.action, part.edges.hypothesis, part.edges.target), part.stay.shape)
+        )
         return part
 
     def learn(self, previous: int | None, action: int | None, pattern: int | None) -> Revelation | None:
@@ -211,6 +220,7 @@ class RecognitionModel:
         revelation = self._reveal(pattern)
         if previous is not None and action is not None:
             self._count(previous, action, pattern)
+        self._refresh_transitions()
         return revelation
 
     def _reveal(self, pattern: int) -> Revelation | None:
@@ -224,18 +234,25 @@ class RecognitionModel:
         shares = np.where(last, 1.0, truth / (truth + noise))
         self.n_known[hypotheses] += 1
         states = self.n_known[hypotheses]
-        padding = int(states.max()) + 1 - self.n_states
-        if padding > 0:
-            self.pattern_of = np.pad(self.pattern_of, ((0, 0), (0, padding)), constant_values=-1)
+        self.pattern_of = widened(self.pattern_of, int(states.max()) + 1, -1)
         self.aspect_of[hypotheses, pattern] = states
         self.pattern_of[hypotheses, states] = pattern
+        self.known[hypotheses, pattern] = 1.0
+        self.unknown[hypotheses, pattern] = 0.0
         self._refresh_aspects()
-        self._refresh_transitions()
         return Revelation(hypotheses, states, shares)
 
     def _count(self, previous: int, action: int, pattern: int) -> None:
         sources, targets = self.aspect_of[:, previous], self.aspect_of[:, pattern]
-        hypotheses = np.flatnonzero((sources != COLLECTION) & (targets != COLLECTION))
+        edges = self.edges
+        of_action = edges.of_action(action)
+        owners = edges.hypothesis[of_action]
+        same = (edges.source[of_action] == sources[owners]) & (edges.target[of_action] == targets[owners])
+        again = of_action[same]
+        edges.weight[again] += 1.0
+        first_time = (sources != COLLECTION) & (targets != COLLECTION)
+        first_time[edges.hypothesis[again]] = False
+        hypotheses = np.flatnonzero(first_time)
         new = Edges(
             np.full(len(hypotheses), action),
             hypotheses,
@@ -243,5 +260,14 @@ class RecognitionModel:
             targets[hypotheses],
             np.ones(len(hypotheses)),
         )
-        self.edges = self.edges.followed_by(new)
-        self._refresh_transitions()
+        self.edges = edges.followed_by(new)
+
+
+def widened(table: NDArray[_Number], width: int, fill: float = 0) -> NDArray[_Number]:
+    """Return a copy of ``table`` [..., W] with ``width`` columns or, if that is more, as many as it has.
+
+    New columns hold ``fill``.
+    """
+    wide = np.full((*table.shape[:-1], max(width, table.shape[-1])), fill, dtype=table.dtype)
+    wide[..., : table.shape[-1]] = table
+    return wide

@@ -77,7 +77,7 @@ class PatternAlphabet:
         return np.array(self.patterns, dtype=np.int64)
 
     @cached_property
-    def _index_of(self) -> dict[Pattern, int]:
+    def _index_of(self) -> dict[Detection, int]:
         return {pattern: index for index, pattern in enumerate(self.patterns)}
 
     def index(self, pattern: Sequence[int]) -> int:
@@ -137,12 +137,16 @@ class Evidence:
             InvalidInputError: The detection does not fit the alphabet.
         """
         checked = alphabet.check_detection(detection)
+        pattern = alphabet._index_of.get(checked)
+        if pattern is not None:
+            likelihood = np.zeros(len(alphabet))
+            likelihood[pattern] = 1.0
+            return cls(likelihood, pattern)
         agrees = np.ones(len(alphabet), dtype=bool)
         for slot, symbol in enumerate(checked):
             if symbol is not None:
                 agrees &= alphabet.symbols[:, slot] == symbol
-        complete = None not in checked
-        return cls(agrees.astype(np.float64), int(agrees.argmax()) if complete else None)
+        return cls(agrees.astype(np.float64))
 
     @classmethod
     def of_likelihood(cls, alphabet: PatternAlphabet, likelihood: ArrayLike) -> Evidence:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from atg_fg.assumptions import Assumptions
-from atg_fg.expected_entropy import edge_arrivals
+from atg_fg.expected_entropy import next_pattern_joint, pattern_table
 from atg_fg.memory import RobotMemory
 from atg_fg.model import COLLECTION, RecognitionModel
 from atg_fg.parameters import ModelParameters
@@ -167,5 +167,7 @@ def test_restricted_tables_are_those_of_the_hypotheses_that_are_left() -> None:
         table_is(part.transition(action), model.transition(action)[[0, 2, 3]])
     evidence = seen(assumptions, 3)
     table_is(part.likelihood(evidence), model.likelihood(evidence)[[0, 2, 3]])
-    mass = part.prior[:, None] * part.base
-    table_is(edge_arrivals(part, mass), edge_arrivals(model, model.prior[:, None] * model.base)[:, [0, 2, 3]])
+    mass = model.prior[:, None] * model.base
+    whole = pattern_table(model, next_pattern_joint(model, mass), np.arange(4))
+    left = pattern_table(part, next_pattern_joint(part, mass[[0, 2, 3]]), np.arange(3))
+    table_is(left, whole[:, [0, 2, 3]])

@@ -12,7 +12,7 @@ from atg_fg.chain import Chain, History, build_chain
 from atg_fg.errors import ImpossibleEvidenceError, InvalidInputError
 from atg_fg.imagined import ImaginedBelief, TableBelief
 from atg_fg.memory import RobotMemory
-from atg_fg.model import RecognitionModel, Revelation
+from atg_fg.model import RecognitionModel, Revelation, widened
 from atg_fg.parameters import ModelParameters
 from atg_fg.patterns import Evidence, FloatArray
 from atg_fg.situations import Situation, shown_patterns_of, situations_of
@@ -243,15 +243,15 @@ class FilterInference(Inference):
         if not np.isfinite(peak):
             raise self._impossible()
         log_probability = float(peak + np.log(np.exp(log_joint - peak).sum()))
-        # A hypothesis that is ruled out keeps its prediction; its weight is zero from here on.
-        divisor = np.where(possible, given_object, 1.0)[:, None]
-        aspects = np.where(possible[:, None], joint / divisor, self._belief.aspects)
+        aspects = joint / np.where(possible, given_object, 1.0)[:, None]
+        if not possible.all():
+            # A hypothesis that is ruled out keeps its prediction; its weight is zero from here on.
+            aspects[~possible] = self._belief.aspects[~possible]
         self._belief = _State(log_joint - log_probability, aspects)
         self._log_evidence += log_probability
 
     def _divide(self, revelation: Revelation) -> None:
-        padding = self.model.n_states - self._belief.aspects.shape[1]
-        aspects = np.pad(self._belief.aspects, ((0, 0), (0, padding)))
+        aspects = widened(self._belief.aspects, self.model.n_states)
         revelation.move(aspects)
         self._belief = _State(self._belief.log_identity, aspects)
 

@@ -12,7 +12,7 @@ import numpy as np
 
 from atg_fg.chain import Chain
 from atg_fg.engines.base import FilterInference
-from atg_fg.expected_entropy import edge_arrivals, expected_entropies_of
+from atg_fg.expected_entropy import expected_entropies_of
 from atg_fg.patterns import FloatArray
 
 
@@ -23,10 +23,7 @@ class BayesFilter(FilterInference):
     exact: ClassVar[bool] = True
 
     def _propagate(self, aspects: FloatArray, action: int) -> FloatArray:
-        model = self.model
-        kept = (aspects * model.stay[action]).sum(axis=1)
-        predicted: FloatArray = kept[:, None] * model.base + edge_arrivals(model, aspects)[action]
-        return predicted
+        return self.model.predict(aspects, action)
 
     def _correct(self, aspects: FloatArray, likelihood: FloatArray) -> FloatArray:
         return aspects * likelihood

@@ -19,8 +19,8 @@ def options_of(engine: type) -> list[str]:
 
 def check_known(engine: type, name: str, options: Iterable[str]) -> None:
     """Raise ``InvalidInputError`` if the engine named ``name`` lacks one of ``options``."""
-    known = options_of(engine)
     for option in options:
+        known = options_of(engine)
         if option not in known:
             expected = f"one of: {', '.join(known)}" if known else "none, this engine has no options"
             raise InvalidInputError(f"engine {name!r}: unknown option {option!r}; expected {expected}")

@@ -39,7 +39,9 @@ class Policy(Protocol):
 
 def best_actions(costs: FloatArray) -> list[int]:
     """Return all actions whose cost, such as the expected entropy, is the least, up to ``TIE_TOLERANCE``."""
-    return [int(action) for action in np.flatnonzero(costs <= costs.min() + TIE_TOLERANCE)]
+    values = costs.tolist()
+    least = min(values) + TIE_TOLERANCE
+    return [action for action, value in enumerate(values) if value <= least]
 
 
 def one_of_the_best(costs: FloatArray, rng: np.random.Generator) -> int:

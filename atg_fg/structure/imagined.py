@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 
 from atg_fg.belief import x_log_x
-from atg_fg.expected_entropy import edge_arrivals, expected_entropies_of_table, next_pattern_joint, pattern_table
+from atg_fg.expected_entropy import expected_entropies_of_table, next_pattern_joint, pattern_table
 from atg_fg.model import RecognitionModel
 from atg_fg.patterns import Evidence, FloatArray, IntArray
 from atg_fg.structure.pose_filter import UNIMPORTANT, PoseFilter
@@ -109,10 +109,8 @@ class StructureLooks:
     def belief(self, look: int) -> StructureBelief:
         """Return the belief after a look of probability above 0."""
         before, model = self._before, self._before.model
-        kept = (before.plain * model.stay[self._action]).sum(axis=1)
-        predicted = kept[:, None] * model.base + edge_arrivals(model, before.plain)[self._action]
         seen = Evidence((np.arange(model.n_patterns) == look).astype(np.float64), look)
-        plain = predicted * model.likelihood(seen)
+        plain = model.predict(before.plain, self._action) * model.likelihood(seen)
         following = [self._followed(each, look) for each in before.following]
         total = plain.sum() + sum(each.belief.sum() for each in following)
         return StructureBelief(

@@ -1,0 +1,99 @@
+"""X_t eliminated with GTSAM from all objects and actions at once.
+
+Given O = i and an action, what comes next depends on X_t in few ways. So all things that may come next, of any object
+by any action, are the states of one variable: the *cells*. X_t is eliminated from two factors on X_t and cell,
+
+    p(cell) = Σ_x belief(x, cell) · weight(x, cell)
+
+in which states of X_t with the same weights are one state, numbered anew for each object and action. Which these are
+follows from the form of a transition row, ``stay · base`` plus a few counted edges (see ``atg_fg.model``). As far as
+the base goes, they are the aspects from which the action was counted as often (``RowKinds``). In a cell that edges
+lead to, they are all aspects without such an edge (``EdgesInto``).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from atg_fg import factors
+from atg_fg.factors import HYPOTHETICAL_KEY, Factor
+from atg_fg.patterns import FloatArray, IntArray
+
+_NOW, _CELL = factors.aspect_key(0), HYPOTHETICAL_KEY
+
+
+class CellFactor:
+    """weight(x, cell) as a factor, from whose product with a belief X_t is eliminated.
+
+    Args:
+        weights: Shape [S, C], for S states of X_t and C cells, neither of them none.
+    """
+
+    def __init__(self, weights: FloatArray) -> None:
+        self._n_cells = weights.shape[1]
+        self._factor = belief_factor(weights)
+
+    def without_aspect(self, belief: Factor) -> FloatArray:
+        """Return p(cell), shape [C]: the product with a belief, with X_t summed out."""
+        return factors.vector((belief * self._factor).sum(factors.ordering([_NOW])), self._n_cells)
+
+
+def belief_factor(belief: FloatArray) -> Factor:
+    """Return belief(x, cell), shape [S, C], as a factor."""
+    return factors.factor([_NOW, _CELL], belief)
+
+
+class RowKinds:
+    """The states of X_t as far as a transition row is its base: one for each value of ``stay`` in (action, object).
+
+    Args:
+        stay: Share of the base in each row, shape [A, H, W].
+
+    Attributes:
+        stay: The same of each state, shape [S, A · H]; zero where an action and object has fewer.
+    """
+
+    def __init__(self, stay: FloatArray) -> None:
+        ascending = np.argsort(stay, axis=-1)
+        found = np.take_along_axis(stay, ascending, axis=-1)
+        ranks = np.zeros(stay.shape, dtype=np.int64)
+        np.cumsum(found[..., 1:] != found[..., :-1], axis=-1, out=ranks[..., 1:])
+        states = np.empty_like(ranks)
+        np.put_along_axis(states, ascending, ranks, axis=-1)
+        n_cells = stay.shape[0] * stay.shape[1]
+        self._places = states * n_cells + np.arange(n_cells).reshape(*stay.shape[:2], 1)
+        self.stay = np.zeros((int(states.max()) + 1, n_cells))
+        self.stay.ravel()[self._places] = stay
+
+    def belief(self, mass: FloatArray) -> Factor:
+        """Return the belief ``mass`` [H, W] over these states in each cell (action, object), as a factor."""
+        everywhere = np.broadcast_to(mass, self._places.shape)
+        # Sums, not differences of sums: what is left may be tiny and must stay exact.
+        lumped = np.bincount(self._places.ravel(), weights=everywhere.ravel(), minlength=self.stay.size)
+        return belief_factor(lumped.reshape(self.stay.shape).astype(np.float64))
+
+
+class EdgesInto:
+    """The states of X_t by the edges into a cell: 0 for no edge, then the source of each edge.
+
+    Args:
+        cells: The cell that each edge leads to, shape [E].
+        n_cells: C.
+    """
+
+    def __init__(self, cells: IntArray, n_cells: int) -> None:
+        order = np.argsort(cells, kind="stable")
+        in_order = cells[order]
+        states = np.empty_like(cells)
+        states[order] = 1 + np.arange(len(cells)) - np.searchsorted(in_order, in_order)
+        self._places = states * n_cells + cells
+        self._n_cells = n_cells
+        # A factor has at least one cell, even where no edge leads anywhere.
+        self._shape = (1 + int(states.max(initial=0)), max(n_cells, 1))
+
+    def table(self, no_edge: FloatArray | float, edges: FloatArray) -> FloatArray:
+        """Return a table, shape [S, max(C, 1)], with the values of state 0, [C], and of each edge, [E]."""
+        table = np.zeros(self._shape)
+        table[0, : self._n_cells] = no_edge
+        table.ravel()[self._places] = edges
+        return table
