@@ -155,3 +155,20 @@ def test_graphs_are_equal_only_in_name_aspects_counts_and_assumptions() -> None:
     assert cup != graph(one_slot(6, 3, 6, actions=("push", "pull")), "cup", [(0,), (1,)], (0, 0, 1, 1))
     assert cup != "cup"
     assert repr(cup) == "AspectTransitionGraph('cup', 2 of 3 aspects, 1 observed edges)"
+
+
+def test_the_table_of_counts_follows_the_graph() -> None:
+    atg = empty()
+    assert atg.count_table.shape == (0, 4)
+    atg.add_aspect((0,))
+    atg.add_aspect((2,))
+    atg.add_transition(0, 1, 1)
+    assert atg.count_table.tolist() == [[0, 1, 1, 1]]
+    twin = atg.copy()
+    atg.add_transition(0, 1, 1)
+    atg.add_transition(1, 0, 0, count=4)
+    assert atg.count_table.tolist() == [[0, 1, 1, 2], [1, 0, 0, 4]]
+    assert atg.n_counted == 2
+    assert twin.count_table.tolist() == [[0, 1, 1, 1]]
+    with pytest.raises(ValueError, match="read-only"):
+        atg.count_table[0, 3] = 7

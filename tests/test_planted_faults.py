@@ -40,8 +40,8 @@ FAULTS = [
     Fault(
         "keys of the transition factor in the wrong order",
         "recognition.py",
-        "self._add([object_key(), aspect_key(time - 1), aspect_key(time)], transition)",
-        "self._add([object_key(), aspect_key(time), aspect_key(time - 1)], transition)",
+        "self._add([self.object_key, self.aspect_key(time - 1), self.aspect_key(time)], transition)",
+        "self._add([self.object_key, self.aspect_key(time), self.aspect_key(time - 1)], transition)",
     ),
     Fault(
         "mass of the collection node lost",
@@ -58,26 +58,26 @@ FAULTS = [
     Fault(
         "unseen objects counted as one in the entropy",
         "belief.py",
-        "float(self.unseen * np.log(self.n_unseen) - x_log_x(probabilities).sum())",
-        "float(-x_log_x(probabilities).sum())",
+        "float(self.unseen * np.log(self.n_unseen) - x_log_x(self.probabilities).sum())",
+        "float(-x_log_x(self.probabilities).sum())",
     ),
     Fault(
         "noise of observations left out where a pattern is known",
         "model.py",
-        ") + noise\n        table[:, COLLECTION]",
-        ")\n        table[:, COLLECTION]",
+        "shown = (1.0 - self.parameters.observation_noise) * evidence.likelihood + noise",
+        "shown = (1.0 - self.parameters.observation_noise) * evidence.likelihood",
     ),
     Fault(
         "patterns of known aspects expected of the collection node",
         "model.py",
-        "n_unknown = np.maximum(n_patterns - self.n_known, 1)",
-        "n_unknown = np.full_like(self.n_known, n_patterns)",
+        "(1.0 - delta) / np.maximum(self.n_unknown, 1.0)",
+        "(1.0 - delta) / n_patterns",
     ),
     Fault(
         "concentration left out of the edges' share",
         "model.py",
-        "self.edge_probability = self.edges.weight / (totals[rows] + alpha)",
-        "self.edge_probability = self.edges.weight / totals[rows]",
+        "self.edge_probability = edges.weight / totals",
+        "self.edge_probability = edges.weight / (totals - alpha)",
     ),
     Fault(
         "all of the collection node's belief given to a new aspect",
@@ -94,8 +94,8 @@ FAULTS = [
     Fault(
         "every edge counted once, however often it was seen",
         "model.py",
-        "columns = np.array(entries, dtype=np.int64).reshape(-1, 5).T",
-        "columns = np.array([(*entry[:4], 1) for entry in entries], dtype=np.int64).reshape(-1, 5).T",
+        "self.edges = Edges(action, owners, 1 + source, 1 + target, count.astype(np.float64))",
+        "self.edges = Edges(action, owners, 1 + source, 1 + target, np.ones(len(count)))",
     ),
     Fault(
         "evidence of the look before used for the look",
