@@ -18,7 +18,7 @@
 #
 # In the paper every object is learned by itself: an action never tried may lead to any of the 132 patterns. But after a
 # *flip* the new front is always the old top, of every cube. This notebook shows what is gained by learning what all
-# objects share: registers that hold an object's symbols, and the permutation that each action makes of them. Nothing is
+# objects share: registers that hold an object's symbols, and what each action makes of them. Nothing is
 # told about cubes.
 
 # %%
@@ -36,7 +36,7 @@ from atg_fg.policies import RandomPolicy
 from atg_fg.structure.completed_picture import draw_completed_atg
 from atg_fg.structure.completion import completed_atg, statuses
 from atg_fg.structure.structure_picture import draw_structure
-from atg_fg.structure.words import permutation_text, register_names
+from atg_fg.structure.words import action_text, register_names
 
 assumptions = arcube_assumptions()
 cubes = make_arcubes(8, seed=0)
@@ -60,7 +60,7 @@ for n_trials in (1, 2, 3, 5, 8):
 structure = memory.learner.candidates[0]
 names = register_names(structure, assumptions.alphabet.slots)
 for action, sources in zip(assumptions.actions, structure.sources, strict=True):
-    print(f"{action}: {permutation_text(sources, names)}")
+    print(f"{action}: {action_text(sources, names)}")
 draw_structure(structure, assumptions)
 
 # %% [markdown]

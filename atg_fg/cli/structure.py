@@ -18,7 +18,7 @@ from atg_fg.structure.completion import CompletedGraph, completed_atg, statuses
 from atg_fg.structure.learner import BelievedStructure
 from atg_fg.structure.memory import StructuredMemory
 from atg_fg.structure.structure_picture import draw_structure
-from atg_fg.structure.words import permutation_text, register_names
+from atg_fg.structure.words import action_text, register_names
 
 app = typer.Typer(no_args_is_help=True)
 
@@ -44,7 +44,7 @@ def show(
     ] = None,
     json_file: options.JsonFile = None,
 ) -> None:
-    """Show the learned structure: registers, permutations, rates, and what it predicts of each object.
+    """Show the learned structure: registers, what actions do to them, rates, and what it predicts of each object.
 
     Example: atg-fg structure show memory.json --plot structure.png
     """
@@ -141,7 +141,7 @@ def _tell(file: Path, document: dict[str, Any]) -> None:
         )
         for action, sources in structure["sources"].items():
             indices = [registers.index(source) for source in sources]
-            console.print(f"  {action}: {permutation_text(indices, registers)}", markup=False, soft_wrap=True)
+            console.print(f"  {action}: {action_text(indices, registers)}", markup=False, soft_wrap=True)
     rates = ", ".join(f"{name} {value:.4f}" for name, value in document["rates"].items())
     console.print(f"rates: {rates}")
     table = Table()

@@ -37,7 +37,8 @@ def pose_patterns(poses: Poses, contents: FloatArray, rates: Rates, alphabet: Pa
     by_slot = [shown[:, registers].reshape(-1, alphabet.n_symbols) for registers in in_view.T]
     different = soft.distinctness(by_slot, alphabet.symbols)
     patterns: FloatArray = soft.pattern_products(by_slot, alphabet.symbols) / different[:, None]
-    return patterns.reshape(len(contents), len(poses.registers), len(alphabet))
+    possible = poses.possible(len(alphabet.slots))[:, None]
+    return patterns.reshape(len(contents), len(poses.registers), len(alphabet)) * possible
 
 
 def pose_chain(

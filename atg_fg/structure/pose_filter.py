@@ -3,8 +3,9 @@
 What is believed of an object is a set of rows: a pose, its probability, and a soft table of contents given that pose.
 A look weighs the rows and reveals registers; an action turns each pose, and leaves a second row behind for a slip. Rows
 of one object that come to the same pose become one, whose table has their mean. That is the approximation: the rest of
-what they knew, how registers depend on each other and on the way the pose was reached, is given up. A known object, and
-a new one that never slips, never has two rows in one pose, and is filtered exactly.
+what they knew, how registers depend on each other and on the way the pose was reached, is given up. The rows of a known
+object all have one table, and of a new one that never slips no two that began alike are in one pose: both are filtered
+exactly.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import copy
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from atg_fg.belief import log_sum_exp
 from atg_fg.patterns import FloatArray, IntArray, PatternAlphabet
@@ -24,24 +26,29 @@ from atg_fg.structure.shared_structure import Poses
 NEGLIGIBLE: Final = 1e-9
 #: Rows less probable than this are left out of what is predicted for planning.
 UNIMPORTANT: Final = 1e-6
+#: A row that is by no more than this above one half is not preferred to the others.
+EVEN: Final = 1e-3
 #: Columns of ``Rows.events``.
 SLIP, WRONG, REPEAT, REVEAL = range(4)
 _ONE_SLIP: Final = np.eye(4)[SLIP]
 
 
 class Rows(NamedTuple):
-    """What is believed, a row for each owner and pose that is not negligible, in this order.
+    """What is believed, a row for each owner, start and pose that is not negligible, in this order.
 
     Attributes:
         owner: The object, or trial, that a row is about, shape [R].
+        start: Which class of poses a new object was in at first, shape [R]; 0 for known ones. What is lost in one pose
+            may be known in the other, so that rows which began apart are kept apart.
         pose: Shape [R].
-        weight: p(pose | owner, what was seen), shape [R].
+        weight: p(start, pose | owner, what was seen), shape [R].
         table: Index of the row's table of contents, shape [R]; rows that know the same share one.
         events: Expected slips, wrong looks, repeated symbols and revealed registers so far, shape [R, 4]; rivals for
             one trial do without.
     """
 
     owner: IntArray
+    start: IntArray
     pose: IntArray
     weight: FloatArray
     table: IntArray
@@ -49,7 +56,14 @@ class Rows(NamedTuple):
 
     def take(self, index: IntArray) -> Rows:
         """Return the rows with these indices."""
-        return Rows(self.owner[index], self.pose[index], self.weight[index], self.table[index], self.events[index])
+        return Rows(
+            self.owner[index],
+            self.start[index],
+            self.pose[index],
+            self.weight[index],
+            self.table[index],
+            self.events[index],
+        )
 
 
 class PoseFilter:
@@ -78,13 +92,18 @@ class PoseFilter:
         self._poses, self._rates, self._alphabet = poses, rates, alphabet
         self._log_weights = log_weights
         n_owners, n_poses = len(contents), len(poses.registers)
-        # A new object's registers have no names yet, so any pose is as good as another.
-        n_first = np.where(contents.any(axis=(1, 2)), n_poses, 1)
+        # A new object's registers have no names yet, so any pose of a class is as good as another.
+        is_known: NDArray[np.bool_] = np.any(contents, axis=(1, 2))
+        n_first = np.where(is_known, n_poses, len(poses.first))
         owner = np.repeat(np.arange(n_owners), n_first)
-        pose = np.arange(len(owner)) - np.repeat(np.cumsum(n_first) - n_first, n_first)
-        self.rows = Rows(owner, pose, 1.0 / n_first[owner], owner, np.zeros((len(owner), 4)))
+        position = np.arange(len(owner)) - np.repeat(np.cumsum(n_first) - n_first, n_first)
+        start = np.where(is_known[owner], 0, position)
+        pose = np.where(is_known[owner], position, poses.first[start])
+        weight = np.where(is_known[owner], 1.0 / n_poses, poses.first_weights[start])
+        self.rows = Rows(owner, start, pose, weight, owner, np.zeros((len(owner), 4)))
         self._contents = contents
         self._shown = soft.symbol_probabilities(contents, rates.repeat)
+        self._possible = poses.possible(len(alphabet.slots))
         self.log_evidence = np.zeros(n_owners)
 
     def copy(self) -> PoseFilter:
@@ -112,7 +131,7 @@ class PoseFilter:
         rows = self.rows
         seen = np.broadcast_to(symbols, (len(self.log_evidence), symbols.shape[-1]))[rows.owner]
         registers, shown = self._in_view(rows)
-        probability = 1.0 / soft.distinctness(shown, self._alphabet.symbols)
+        probability = self._possible[rows.pose] / soft.distinctness(shown, self._alphabet.symbols)
         index = np.arange(len(rows.owner))
         for slot, probabilities in enumerate(shown):
             probability *= probabilities[index, seen[:, slot]]
@@ -135,7 +154,7 @@ class PoseFilter:
         likelihood = np.broadcast_to(likelihood, (len(self.log_evidence), len(symbols)))
         registers, shown = self._in_view(rows)
         joint = soft.pattern_products(shown, symbols) / soft.distinctness(shown, symbols)[:, None]
-        joint *= likelihood[rows.owner]
+        joint *= self._possible[rows.pose, None] * likelihood[rows.owner]
         probability = joint.sum(axis=1)
         kept, truth = self._condition(probability, likelihood.sum(axis=1))
         right = np.flatnonzero(truth > soft.SAME)
@@ -175,11 +194,12 @@ class PoseFilter:
     def poses_of(self, owner: int) -> dict[int, float]:
         """Return the probability of each pose of an owner that is not negligible."""
         own = np.flatnonzero(self.rows.owner == owner)
-        weight = self.rows.weight[own]
-        return dict(zip(self.rows.pose[own].tolist(), (weight / weight.sum()).tolist(), strict=True))
+        weight = np.bincount(self.rows.pose[own], self.rows.weight[own])
+        there = np.unique(self.rows.pose[own])
+        return dict(zip(there.tolist(), (weight[there] / weight.sum()).tolist(), strict=True))
 
     def learned_contents(self, owner: int) -> FloatArray | None:
-        """Return the table of an owner's most probable pose if it is at least even, else their mean, shape [P, S].
+        """Return the table of an owner's most probable row if it is more so than all others, else their mean, [P, S].
 
         ``None`` if the owner has been ruled out.
         """
@@ -188,7 +208,7 @@ class PoseFilter:
             return None
         weight, table = self.rows.weight[own], self.rows.table[own]
         best = int(weight.argmax())
-        if weight[best] >= 0.5 * weight.sum():
+        if weight[best] > (0.5 + EVEN) * weight.sum():
             table = table[[best]]
             weight = np.ones(1)
         mean: FloatArray = np.einsum("r,rps->ps", weight / weight.sum(), self._contents[table])
@@ -255,7 +275,7 @@ class PoseFilter:
         self.rows.events[rows, REPEAT] += (revealed * share).sum(axis=1)
 
     def _merge(self, tables: FloatArray, changed: IntArray) -> None:
-        """Make one row of those with the same owner and pose, and keep each different table once.
+        """Make one row of those with the same owner, start and pose, and keep each different table once.
 
         Args:
             tables: New ones, shape [I, P, S].
@@ -265,7 +285,7 @@ class PoseFilter:
         contents = [self._contents, tables]
         table = rows.table.copy()
         table[changed] = n_old + np.arange(len(changed))
-        key = rows.owner * len(self._poses.registers) + rows.pose
+        key = (rows.owner * len(self._poses.first) + rows.start) * len(self._poses.registers) + rows.pose
         order = np.argsort(key, kind="stable")
         first, group = _runs(key[order])
         weight = np.add.reduceat(rows.weight[order], first)
@@ -284,13 +304,13 @@ class PoseFilter:
         shown = soft.symbol_probabilities(self._contents[used >= n_old], self._rates.repeat)
         self._shown = np.concatenate((self._shown[used[used < n_old]], shown))
         last = order[first]
-        self.rows = Rows(rows.owner[last], rows.pose[last], weight, table, events)
+        self.rows = Rows(rows.owner[last], rows.start[last], rows.pose[last], weight, table, events)
 
     def _patterns_of(self, rows: Rows, weights: FloatArray, first: IntArray) -> FloatArray:
         """Return the weighted sum of what rows show, for each owner, shape [I, |𝒵|]."""
         _, shown = self._in_view(rows)
         symbols = self._alphabet.symbols
-        shown[0] = shown[0] * (weights / soft.distinctness(shown, symbols))[:, None]
+        shown[0] = shown[0] * (weights * self._possible[rows.pose] / soft.distinctness(shown, symbols))[:, None]
         combined = shown[0]
         for probabilities in shown[1:]:
             combined = (combined[:, :, None] * probabilities[:, None, :]).reshape(len(combined), -1)

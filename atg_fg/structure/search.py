@@ -1,8 +1,8 @@
 """Search for structures that explain trials: many chains of Gibbs sampling at once, cooled step by step.
 
-A move takes one register of one action and swaps its source with that of another register, or leaves it: all these
-neighbours are scored together, and one of them is drawn by its score at the present temperature. Nothing is rejected,
-so few steps do; they are bounded in number, whatever the clock says.
+First only permutations are looked at, of which there are few enough. Then one chain for each number of registers goes
+on from the best of these among all maps, most of which are a copy or two away from some permutation. The steps are
+bounded in number, whatever the clock says.
 """
 
 from __future__ import annotations
@@ -14,9 +14,10 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from atg_fg.assumptions import Assumptions
-from atg_fg.patterns import FloatArray, IntArray
+from atg_fg.patterns import IntArray
+from atg_fg.structure.chains import Chains, padded
 from atg_fg.structure.quick_score import QuickScore
-from atg_fg.structure.shared_structure import SharedStructure
+from atg_fg.structure.shared_structure import SharedStructure, is_permutation
 from atg_fg.structure.trials import RawTrial
 
 #: Nats that a structure may be worse than none by the quick score, and still be proposed.
@@ -29,9 +30,11 @@ class SearchPlan:
 
     Attributes:
         max_hidden: Hidden registers of the largest structure looked at.
-        n_chains: Chains for each number of registers.
-        n_steps: Moves of each chain.
+        n_chains: Chains for each number of registers, among permutations.
+        n_steps: Moves of each of them.
+        n_copying_steps: Moves of each chain among all maps.
         hottest: First temperature, in nats.
+        hottest_copying: The same among all maps: cool, as these chains begin from the best permutations.
         coldest: Last temperature, in nats.
         n_looks: Looks in the pieces of trials that are looked at, drawn at random if there are more.
         n_actions: Actions in a piece: a slip spoils what comes after it, so long trials are cut.
@@ -40,7 +43,9 @@ class SearchPlan:
     max_hidden: int = 6
     n_chains: int = 3
     n_steps: int = 120
+    n_copying_steps: int = 60
     hottest: float = 6.0
+    hottest_copying: float = 2.0
     coldest: float = 0.5
     n_looks: int = 132
     n_actions: int = 10
@@ -69,6 +74,8 @@ def propose_structures(
 ) -> Proposals:
     """Return the best structure that each chain met.
 
+    One with an irreversible action is proposed only if it is better than all permutations by the quick score.
+
     Args:
         trials: Raw trials; with none there is nothing to propose.
         assumptions: Actions and alphabet.
@@ -80,11 +87,18 @@ def propose_structures(
     pieces = _drawn_pieces(trials, rng, plan)
     if not pieces:
         return Proposals((), 0)
-    chains = _Chains(QuickScore(pieces, assumptions), assumptions, rng, plan, incumbents)
-    for step in range(plan.n_steps):
-        cooled = step / max(plan.n_steps - 1, 1)
-        chains.move(plan.hottest * (plan.coldest / plan.hottest) ** cooled)
-    return Proposals(chains.best_structures(), chains.n_evaluations)
+    search = _Search(QuickScore(pieces, assumptions), assumptions, plan)
+    reversible = [each for each in incumbents if all(map(is_permutation, each.sources))]
+    permutations = search.permutations(reversible, rng)
+    irreversible = [each for each in incumbents if each not in reversible]
+    # A generator of its own, so that the permutations are searched for as if there were nothing else.
+    maps = search.maps(permutations, irreversible, rng.spawn(1)[0])
+    found = search.totals(permutations)
+    best = max(found.values())
+    found |= {structure: total for structure, total in search.totals(maps).items() if total > best}
+    least = search.plain - HOPELESS
+    hopeful = sorted((each for each, total in found.items() if total >= least), key=lambda each: -found[each])
+    return Proposals(tuple(hopeful), search.n_evaluations)
 
 
 def _drawn_pieces(trials: Sequence[RawTrial], rng: np.random.Generator, plan: SearchPlan) -> list[RawTrial]:
@@ -98,92 +112,74 @@ def _drawn_pieces(trials: Sequence[RawTrial], rng: np.random.Generator, plan: Se
     return [pieces[index] for index in np.sort(order[:n_drawn])]
 
 
-class _Chains:
-    """C chains, each with its own number of registers, padded with registers that every action leaves alone."""
+class _Search:
+    """The two parts of a search, with what they have in common."""
 
-    def __init__(
-        self,
-        score: QuickScore,
-        assumptions: Assumptions,
-        rng: np.random.Generator,
-        plan: SearchPlan,
-        incumbents: Sequence[SharedStructure],
-    ) -> None:
-        self._score, self._rng = score, rng
+    def __init__(self, score: QuickScore, assumptions: Assumptions, plan: SearchPlan) -> None:
+        self._score, self._plan = score, plan
         self._n_slots, self._n_actions = len(assumptions.alphabet.slots), len(assumptions.actions)
-        sizes = np.arange(self._n_slots, self._n_slots + plan.max_hidden + 1)
-        #: P of each chain, shape [C]
-        self._sizes: IntArray = np.repeat(sizes, plan.n_chains)
-        self._sources = self._beginnings(incumbents)
-        #: Every other chain lets each trial be plain rather than follow the structure; the rest see the way downhill
-        #: from where they explain nothing yet.
-        self._tolerant = np.arange(len(self._sizes)) % 2 == 1
-        self._best_scores = np.full(len(self._sizes), -np.inf)
-        self._best_sources = self._sources.copy()
-        #: All pairs (chain, register to swap with), shape [2, B]
-        self._swaps: IntArray = np.array(
-            [(chain, register) for chain, size in enumerate(self._sizes) for register in range(size)]
-        ).T
+        self._sizes = range(self._n_slots, self._n_slots + plan.max_hidden + 1)
+        self.plain = float(score.plain.sum())
         self.n_evaluations = 0
 
-    def _beginnings(self, incumbents: Sequence[SharedStructure]) -> IntArray:
-        """Return random permutations, or an incumbent for the first chain of its size, shape [C, A, P]."""
+    def permutations(self, incumbents: Sequence[SharedStructure], rng: np.random.Generator) -> list[SharedStructure]:
+        """Return the best structure of permutations that each chain met."""
         known = {structure.n_registers: structure for structure in reversed(incumbents)}
-        widest = int(self._sizes.max())
-        sources = np.broadcast_to(np.arange(widest), (len(self._sizes), self._n_actions, widest)).copy()
-        for chain, size in enumerate(self._sizes.tolist()):
-            structure = known.pop(size, None)
-            for action in range(self._n_actions):
-                drawn = self._rng.permutation(size)
-                sources[chain, action, :size] = drawn if structure is None else structure.sources[action]
-        return sources
+        beginnings = []
+        for size in np.repeat(self._sizes, self._plan.n_chains).tolist():
+            drawn = tuple(tuple(rng.permutation(size).tolist()) for _ in range(self._n_actions))
+            beginnings.append(known.pop(size, SharedStructure(self._n_slots, drawn)))
+        every_other = np.arange(len(beginnings)) % 2
+        return self._cooled(beginnings, every_other, self._plan.n_steps, rng, copies=False)
 
-    def move(self, temperature: float) -> None:
-        """Let each chain draw one of its neighbours, which its present state is among."""
-        n_chains = len(self._sizes)
-        actions = self._rng.integers(self._n_actions, size=n_chains)
-        registers = self._rng.integers(self._sizes)
-        chain, other = self._swaps
-        rows = np.arange(len(chain))
-        candidates = self._sources[chain]
-        action, register = actions[chain], registers[chain]
-        swapped = candidates[rows, action, register], candidates[rows, action, other]
-        candidates[rows, action, other], candidates[rows, action, register] = swapped
-        scores = self._totals(candidates, self._tolerant[chain])
-        self.n_evaluations += len(scores)
-        self._keep_best(candidates, scores)
-        drawn = _best_of_each(scores / temperature + self._rng.gumbel(size=len(scores)), chain, n_chains)
-        self._sources = candidates[drawn]
+    def maps(
+        self,
+        permutations: Sequence[SharedStructure],
+        incumbents: Sequence[SharedStructure],
+        rng: np.random.Generator,
+    ) -> list[SharedStructure]:
+        """Return the best structure that each chain met which began from an incumbent or the best permutations."""
+        totals = self.totals(permutations)
+        best_first = sorted(totals, key=lambda structure: -totals[structure])
+        # Idle registers beside the best are what an irreversible action may take contents from.
+        begin = {
+            size: _with_idle_registers(next(each for each in best_first if each.n_registers <= size), size)
+            for size in self._sizes
+        }
+        begin |= {structure.n_registers: structure for structure in reversed(incumbents)}
+        beginnings = [begin[size] for size in self._sizes]
+        tolerant = np.ones(len(beginnings), dtype=np.int64)
+        return self._cooled(beginnings, tolerant, self._plan.n_copying_steps, rng, copies=True)
 
-    def _totals(self, candidates: IntArray, tolerant: np.ndarray) -> FloatArray:
-        scores = self._score(candidates)
-        totals: FloatArray = scores.sum(axis=1)
-        totals[tolerant] = np.logaddexp(scores[tolerant], self._score.plain).sum(axis=1)
-        return totals
+    def totals(self, structures: Sequence[SharedStructure]) -> dict[SharedStructure, float]:
+        """Return structures in canonical form, without repeats, with ln of their prior and quick score."""
+        different = dict.fromkeys(structure.canonical() for structure in structures)
+        return {structure: self._total(structure) + structure.log_prior for structure in different}
 
-    def _keep_best(self, candidates: IntArray, scores: FloatArray) -> None:
-        best = _best_of_each(scores, self._swaps[0], len(self._sizes))
-        better = scores[best] > self._best_scores
-        self._best_scores = np.where(better, scores[best], self._best_scores)
-        self._best_sources[better] = candidates[best[better]]
+    def _total(self, structure: SharedStructure) -> float:
+        scores = self._score.from_any_start(np.array([structure.sources]))[0]
+        return float(np.logaddexp(scores, self._score.plain).sum())
 
-    def best_structures(self) -> tuple[SharedStructure, ...]:
-        """Return the best structure of each chain, canonical and without repeats, best first."""
-        totals: dict[SharedStructure, float] = {}
-        for size, sources in zip(self._sizes.tolist(), self._best_sources, strict=True):
-            permutations = tuple(tuple(each[:size]) for each in sources.tolist())
-            structure = SharedStructure(self._n_slots, permutations).canonical()
-            if structure not in totals:
-                score = np.logaddexp(self._score(np.array([structure.sources]))[0], self._score.plain).sum()
-                totals[structure] = float(score) + structure.log_prior
-        least = float(self._score.plain.sum()) - HOPELESS
-        hopeful = [structure for structure, total in totals.items() if total >= least]
-        return tuple(sorted(hopeful, key=lambda structure: -totals[structure]))
+    def _cooled(
+        self,
+        beginnings: list[SharedStructure],
+        tolerant: IntArray,
+        n_steps: int,
+        rng: np.random.Generator,
+        *,
+        copies: bool,
+    ) -> list[SharedStructure]:
+        sizes = np.array([structure.n_registers for structure in beginnings])
+        chains = Chains(self._score, sizes, padded(beginnings), tolerant, copies=copies)
+        coldest = self._plan.coldest
+        hottest = self._plan.hottest_copying if copies else self._plan.hottest
+        for step in range(n_steps):
+            chains.move(hottest * (coldest / hottest) ** (step / max(n_steps - 1, 1)), rng)
+        self.n_evaluations += chains.n_evaluations
+        return chains.best_structures(self._n_slots)
 
 
-def _best_of_each(values: FloatArray, group: IntArray, n_groups: int) -> IntArray:
-    """Return the index of the greatest value of each group; ``group`` is ascending and has all of them."""
-    order = np.lexsort((-values, group))
-    first = np.searchsorted(group, np.arange(n_groups))
-    result: IntArray = order[first]
-    return result
+def _with_idle_registers(structure: SharedStructure, n_registers: int) -> SharedStructure:
+    """Return a structure with hidden registers added that every action leaves alone."""
+    idle = tuple(range(structure.n_registers, n_registers))
+    return SharedStructure(structure.n_slots, tuple((*sources, *idle) for sources in structure.sources))

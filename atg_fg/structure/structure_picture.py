@@ -12,7 +12,7 @@ from atg_fg.assumptions import Assumptions
 from atg_fg.figures import GREY, INK, figure_class, plot_style
 from atg_fg.patterns import FloatArray
 from atg_fg.structure.shared_structure import SharedStructure
-from atg_fg.structure.words import cycles, register_names
+from atg_fg.structure.words import copies, cycles, lost, register_names
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -30,10 +30,11 @@ _HIDDEN: Final = "#f1f1f1"
 
 
 def draw_structure(structure: SharedStructure, assumptions: Assumptions) -> Figure:
-    """Draw the registers and the permutation of each action.
+    """Draw the registers and what each action makes of their contents.
 
     Registers stand on a circle, those in view framed strong; an arrow goes from the register that had a content before
-    the action to the one that has it after. What an action leaves alone is pale.
+    the action to the one that has it after. What an action leaves alone is pale; a register whose content is lost has a
+    dashed frame.
 
     Args:
         structure: The structure; about 12 registers are readable.
@@ -57,7 +58,7 @@ def draw_structure(structure: SharedStructure, assumptions: Assumptions) -> Figu
         for axes in panels:
             axes.axis("off")
         for action, sources in enumerate(structure.sources):
-            _draw_permutation(panels[action], sources, names, places, structure.n_slots, action_color(action))
+            _draw_action(panels[action], sources, names, places, structure.n_slots, action_color(action))
             panels[action].set_title(assumptions.actions[action], color=action_color(action), parse_math=False)
     return figure
 
@@ -87,11 +88,12 @@ def _enclosed(corners: FloatArray) -> float:
     return abs(float((x * np.roll(y, -1) - y * np.roll(x, -1)).sum())) / 2
 
 
-def _draw_permutation(
+def _draw_action(
     axes: Axes, sources: Sequence[int], names: Sequence[str], places: FloatArray, n_slots: int, color: str
 ) -> None:
     from matplotlib.patches import FancyArrowPatch
 
+    gone = lost(sources)
     for register, source in enumerate(sources):
         if source != register:
             axes.add_patch(
@@ -100,15 +102,17 @@ def _draw_permutation(
                     arrowstyle="-|>,head_length=7,head_width=3.5", shrinkA=19, shrinkB=19, linewidth=2, color=color,
                 )
             )  # fmt: skip
-        in_view, moves = register < n_slots, source != register
+        in_view, moves = register < n_slots, source != register or sources.count(register) != 1
         axes.annotate(
             names[register], tuple(places[register]), ha="center", va="center", zorder=3, parse_math=False,
             fontweight="bold" if in_view else "normal", color=INK if moves else GREY, alpha=1.0 if moves else 0.6,
             bbox={"boxstyle": "round,pad=0.45", "facecolor": _VISIBLE if in_view else _HIDDEN,
                   "edgecolor": INK if in_view else GREY, "linewidth": 1.8 if in_view else 0.9,
-                  "alpha": 1.0 if moves else 0.6},
+                  "linestyle": "dashed" if register in gone else "solid", "alpha": 1.0 if moves else 0.6},
         )  # fmt: skip
     ways = [" → ".join(names[register] for register in (*way, way[0])) for way in cycles(sources)]
+    ways += [" → ".join(names[register] for register in pair) for pair in copies(sources)]
+    ways += [f"lost: {names[register]}" for register in gone]
     axes.annotate(
         "\n".join(ways) or "nothing moves", (0.5, -0.02), xycoords="axes fraction", ha="center", va="top", fontsize=8,
         color=GREY, parse_math=False,

@@ -6,6 +6,7 @@ from atg_fg import store
 from atg_fg.assumptions import arcube_assumptions
 from atg_fg.memory import RobotMemory
 from atg_fg.structure.memory import StructuredMemory
+from tests.structure.boxes import INSIDE, box_memory
 
 
 @pytest.fixture(scope="module")
@@ -42,6 +43,19 @@ def test_structure_and_completed_graphs_are_drawn_and_exported(run, file, tmp_pa
     assert (len(completed["aspects"]), len(completed["transitions"])) == (24, 72)
     exported = run("memory", "export", file, "--name", "object-001", "--completed")[1]
     assert exported.count("<node ") == 24
+
+
+def test_what_an_irreversible_action_loses_is_said_and_drawn(run, tmp_path):
+    file, memory = tmp_path / "memory.json", box_memory()
+    store.save_memory(memory, file)
+    assert store.load_memory(file) == memory
+    status, output, _ = run("structure", "show", file)
+    assert status == 0
+    assert "8 aspects, registers front, right, top, c4, c5, c6" in output
+    assert f"open: top ← c{INSIDE + 1}; lost: top" in output
+    document = json.loads(run("structure", "show", file, "--json", "-")[1])
+    assert document["structures"][0]["sources"]["open"][2] == f"c{INSIDE + 1}"
+    assert run("structure", "show", file, "--plot", tmp_path / "structure.svg")[0] == 0
 
 
 def test_memories_without_structure_say_so_in_one_line(run, refused, tmp_path):

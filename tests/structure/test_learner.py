@@ -34,7 +34,7 @@ def test_where_there_is_no_structure_none_is_believed_and_the_search_is_bounded(
     weights = [each.weight for each in learner.believed([])]
     assert sum(weights) < 0.02
     milestones = sum(is_milestone(n) for n in range(1, 16))
-    assert learner.n_evaluations == milestones * 12_600
+    assert learner.n_evaluations == milestones * 14_700
 
 
 def test_of_half_and_half_each_object_is_told_apart():

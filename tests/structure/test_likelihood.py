@@ -11,7 +11,7 @@ from atg_fg.structure.pose_chain import exact_log_evidence
 from atg_fg.structure.rates import Rates
 from atg_fg.structure.shared_structure import SharedStructure
 from tests.structure import oracle
-from tests.structure.worlds import ARCUBES, CUBE, NEVER, RING, RING_WORLD, cubes, objects_of, trial_of
+from tests.structure.worlds import ARCUBES, BOX, CUBE, DOUBLE, NEVER, RING, RING_WORLD, cubes, objects_of, trial_of
 
 ALPHABET = RING_WORLD.alphabet
 #: Slips and wrong looks as often as on a bad robot.
@@ -24,18 +24,19 @@ def oracle_of(structure, n_symbols, rates):
     return oracle.Structure(structure.n_slots, structure.sources, n_symbols, slip, wrong)
 
 
-def ring_trials(n, seed, n_actions=5, **noise):
+def trials_of(structure, n, seed, n_actions=5, **noise):
     rng = np.random.default_rng(seed)
-    contents = [rng.permutation(5)[:3].tolist() for _ in range(n)]
-    return contents, [trial_of(each, n_actions, rng, **noise) for each in objects_of(RING, contents)]
+    contents = [rng.permutation(5)[: structure.n_registers].tolist() for _ in range(n)]
+    return contents, [trial_of(each, n_actions, rng, **noise) for each in objects_of(structure, contents)]
 
 
 @pytest.mark.parametrize("missing", [0.0, 0.3])
-def test_objects_whose_contents_are_known_are_filtered_exactly(missing):
-    contents, trials = ring_trials(10, seed=1, slip=0.2, wrong=0.1, missing=missing)
+@pytest.mark.parametrize("structure", [RING, BOX], ids=["ring", "box"])
+def test_objects_whose_contents_are_known_are_filtered_exactly(structure, missing):
+    contents, trials = trials_of(structure, 10, seed=1, slip=0.2, wrong=0.1, missing=missing)
     known = np.eye(5)[np.array(contents)]
-    scores = score_trials(RING, trials, OFTEN, ALPHABET, known)
-    exact = oracle_of(RING, 5, OFTEN)
+    scores = score_trials(structure, trials, OFTEN, ALPHABET, known)
+    exact = oracle_of(structure, 5, OFTEN)
     expected = [
         math.log(exact.probability(tuple(each), trial.detections, trial.actions))
         for each, trial in zip(contents, trials, strict=True)
@@ -44,27 +45,41 @@ def test_objects_whose_contents_are_known_are_filtered_exactly(missing):
     np.testing.assert_allclose(scores.contents, known, atol=1e-12)
 
 
-def test_a_new_object_is_filtered_exactly_if_nothing_goes_wrong():
-    _, trials = ring_trials(10, seed=2)
-    scores = score_trials(RING, trials, NEVER, ALPHABET)
-    exact = oracle_of(RING, 5, NEVER)
+def test_a_pose_that_shows_one_register_twice_explains_no_look():
+    contents, trials = trials_of(RING, 10, seed=1, slip=0.2, wrong=0.1)
+    exact = oracle_of(DOUBLE, 5, OFTEN)
+    expected = [
+        math.log(exact.probability(tuple(each), trial.detections, trial.actions))
+        for each, trial in zip(contents, trials, strict=True)
+    ]
+    actual = score_trials(DOUBLE, trials, OFTEN, ALPHABET, np.eye(5)[np.array(contents)]).log_evidence
+    np.testing.assert_allclose(actual, expected, rtol=0, atol=1e-4)  # rows below 1e-9 are dropped
+
+
+@pytest.mark.parametrize("structure", [RING, BOX], ids=["ring", "box"])
+def test_a_new_object_is_filtered_exactly_if_nothing_goes_wrong(structure):
+    # A new box may be met with its lid on or off.
+    _, trials = trials_of(structure, 10, seed=2)
+    scores = score_trials(structure, trials, NEVER, ALPHABET)
+    exact = oracle_of(structure, 5, NEVER)
     expected = [math.log(exact.fresh(trial.detections, trial.actions)) for trial in trials]
     np.testing.assert_allclose(scores.log_evidence, expected, rtol=0, atol=1e-7)
 
 
+@pytest.mark.parametrize("structure", [RING, BOX], ids=["ring", "box"])
 @pytest.mark.parametrize(("missing", "worst", "usual"), [(0.0, 0.5, 0.05), (0.3, 0.5, 0.1)])
-def test_how_far_off_the_mean_of_merged_contents_is(missing, worst, usual):
+def test_how_far_off_the_mean_of_merged_contents_is(structure, missing, worst, usual):
     # Slips and wrong looks leave contents in doubt: errors in nats of log evidences of about -10.
-    _, trials = ring_trials(40, seed=3, slip=0.05, wrong=0.02, missing=missing)
-    scores = score_trials(RING, trials, OFTEN, ALPHABET)
-    exact = [exact_log_evidence(RING, trial, OFTEN, ALPHABET) for trial in trials]
+    _, trials = trials_of(structure, 40, seed=3, slip=0.05, wrong=0.02, missing=missing)
+    scores = score_trials(structure, trials, OFTEN, ALPHABET)
+    exact = [exact_log_evidence(structure, trial, OFTEN, ALPHABET) for trial in trials]
     errors = np.abs(scores.log_evidence - exact)
     print(f"error of ln p(trial), missing {missing}: mean {errors.mean():.3f}, worst {errors.max():.3f} nats")
     assert errors.max() < worst
     assert errors.mean() < usual
 
 
-@pytest.mark.parametrize("structure", [RING, ROTATION], ids=["ring", "rotation"])
+@pytest.mark.parametrize("structure", [RING, ROTATION, BOX], ids=["ring", "rotation", "box"])
 def test_the_sum_over_all_contents_is_that_of_plain_loops(structure):
     rng = np.random.default_rng(4)
     (shown,) = objects_of(structure, [rng.permutation(5)[: structure.n_registers].tolist()])

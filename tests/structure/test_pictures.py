@@ -10,9 +10,9 @@ from atg_fg.structure.completion import completed_atg
 from atg_fg.structure.memory import StructuredMemory
 from atg_fg.structure.ring_layout import ring_layout
 from atg_fg.structure.structure_picture import draw_structure
-from atg_fg.structure.words import cycles, permutation_text, register_names
+from atg_fg.structure.words import action_text, copies, cycles, lost, register_names
 from tests.structure.test_memory import add
-from tests.structure.worlds import ARCUBES, CUBE, RING, RING_WORLD, cubes, trial_of
+from tests.structure.worlds import ARCUBES, BOX, CUBE, RING, RING_WORLD, cubes, trial_of
 
 
 @pytest.fixture(scope="module")
@@ -88,8 +88,28 @@ def test_every_move_of_a_content_is_an_arrow():
 def test_structures_in_words():
     names = register_names(RING, RING_WORLD.alphabet.slots)
     assert names == ("left", "right", "c3")
-    assert permutation_text(RING.sources[0], names) == "left ← right, right ← c3, c3 ← left"
-    assert permutation_text(RING.sources[1], names) == "left ← right, right ← left"
-    assert permutation_text((0, 1, 2), names) == "nothing moves"
+    assert action_text(RING.sources[0], names) == "left ← right, right ← c3, c3 ← left"
+    assert action_text(RING.sources[1], names) == "left ← right, right ← left"
+    assert action_text((0, 1, 2), names) == "nothing moves"
     assert cycles(RING.sources[0]) == [[0, 2, 1]]
     assert cycles((1, 0, 2, 4, 5, 3)) == [[3, 5, 4], [0, 1]]
+
+
+def test_irreversible_actions_in_words():
+    assert action_text((2, 1, 2), ("front", "top", "c3")) == "front ← c3; lost: front"
+    assert action_text((1, 1, 1), ("front", "top", "c3")) == "front ← top, c3 ← top; lost: front, c3"
+    # Two contents go round, one is copied from there, one is lost.
+    assert (cycles((1, 0, 0)), copies((1, 0, 0)), lost((1, 0, 0))) == ([[0, 1]], [(0, 2)], [2])
+    assert (cycles((1, 2, 2)), copies((1, 2, 2)), lost((1, 2, 2))) == ([], [(1, 0), (2, 1)], [0])
+    assert (copies(RING.sources[0]), lost(RING.sources[0])) == ([], [])
+
+
+def test_what_is_copied_and_what_is_lost_is_drawn():
+    figure = draw_structure(BOX, RING_WORLD)
+    texts = [text.get_text() for text in figure.axes[0].texts]
+    (said,) = [text for text in texts if "lost" in text]
+    assert "→ right" in said
+    assert "lost: right" in said
+    frames = [text.get_bbox_patch() for text in figure.axes[0].texts if text.get_bbox_patch() is not None]
+    assert [frame.get_linestyle() for frame in frames].count("dashed") == 1
+    assert drawn(figure).startswith(b"\x89PNG")

@@ -13,7 +13,7 @@ from atg_fg.recognition import RecognitionGraph
 from atg_fg.structure.pose_chain import completions, pose_chain
 from atg_fg.structure.pose_filter import PoseFilter
 from atg_fg.structure.rates import Rates
-from tests.structure.worlds import ARCUBES, CUBE, RING, RING_WORLD, objects_of, trial_of
+from tests.structure.worlds import ARCUBES, BOX, CUBE, RING, RING_WORLD, objects_of, trial_of
 
 ALPHABET = RING_WORLD.alphabet
 OFTEN = Rates(slip=0.05, wrong=0.02, repeat=1e-12)
@@ -87,6 +87,14 @@ def test_a_new_object_in_the_graph_is_the_sum_over_all_it_may_contain():
     chain = pose_chain(RING.poses(), contents, np.full(60, 1 / 60), OFTEN, ALPHABET, history)
     graph = RecognitionGraph(chain, n_unseen=1)
     assert graph.log_evidence() == pytest.approx(np.logaddexp.reduce(forward_pass(chain).log_joint), abs=1e-12)
+
+
+def test_a_box_in_the_graph_may_be_open_at_first():
+    contents = completions(BOX, ALPHABET)
+    chain = pose_chain(BOX.poses(), contents, np.full(120, 1 / 120), OFTEN, ALPHABET, history_of(5))
+    graph = RecognitionGraph(chain, n_unseen=1)
+    assert graph.log_evidence() == pytest.approx(np.logaddexp.reduce(forward_pass(chain).log_joint), abs=1e-12)
+    np.testing.assert_array_equal(chain.initial, 1 / 4)
 
 
 def test_too_many_contents_are_refused():

@@ -5,7 +5,7 @@ from atg_fg.structure.quick_score import QuickScore
 from atg_fg.structure.search import SearchPlan, propose_structures
 from atg_fg.structure.shared_structure import SharedStructure
 from atg_fg.structure.trials import RawTrial
-from tests.structure.worlds import ARCUBES, CUBE, RING, RING_WORLD, cubes, objects_of, trial_of
+from tests.structure.worlds import ARCUBES, BOX, CUBE, RING, RING_WORLD, cubes, objects_of, trial_of
 
 
 def cube_trials(n, seed, n_actions=10, **noise):
@@ -58,6 +58,26 @@ def test_other_structures_are_found_too():
     assert found.structures[0] == RING
 
 
+@pytest.mark.parametrize("seed", range(3))
+def test_irreversible_actions_are_found(seed):
+    rng = np.random.default_rng(seed)
+    objects = objects_of(BOX, [rng.permutation(5)[:4].tolist() for _ in range(20)])
+    found = propose_structures([trial_of(each, 8, rng) for each in objects], RING_WORLD, rng)
+    assert found.structures[0] == BOX
+
+
+def test_a_trial_that_begins_after_an_irreversible_action_is_explained_from_there():
+    # The front is 0, the top 1: open from the beginning, where opening changes nothing.
+    opened, turned = ((0, 1), (0, 1)), ((0, 1), (2, 1), (2, 1), (0, 1))
+    score = QuickScore([RawTrial(opened, (0,)), RawTrial(turned, (1, 0, 1))], RING_WORLD)
+    sources = np.array([BOX.sources])
+    revealed = -np.cumsum(np.log([5, 4, 3]))
+    np.testing.assert_allclose(score.from_any_start(sources), [revealed[[1, 2]]])
+    assert (score(sources) < revealed[[1, 2]] - 5).all()
+    permutations = np.array([RING.sources])
+    np.testing.assert_array_equal(score.from_any_start(permutations), score(permutations))
+
+
 def test_the_same_generator_finds_the_same():
     trials = cube_trials(3, 0)
     first, second = (propose_structures(trials, ARCUBES, np.random.default_rng(7)) for _ in range(2))
@@ -65,10 +85,10 @@ def test_the_same_generator_finds_the_same():
 
 
 def test_the_search_is_bounded_and_says_how_much_it_did():
-    plan = SearchPlan(max_hidden=2, n_chains=2, n_steps=5)
+    plan = SearchPlan(max_hidden=2, n_chains=2, n_steps=5, n_copying_steps=4)
     found = propose_structures(cube_trials(3, 0), ARCUBES, np.random.default_rng(0), plan=plan)
-    assert found.n_evaluations == 5 * 2 * (2 + 3 + 4)
-    assert len(set(found.structures)) == len(found.structures) <= 6
+    assert found.n_evaluations == (5 * 2 + 4) * (2 + 3 + 4)
+    assert len(set(found.structures)) == len(found.structures) <= 9
     assert all(structure.canonical() == structure for structure in found.structures)
 
 

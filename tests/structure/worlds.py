@@ -22,6 +22,11 @@ CUBE = SharedStructure(
 ).canonical()
 #: Three registers in a ring, two of them in view; one action turns the ring, the other swaps what is in view.
 RING = SharedStructure(2, ((1, 2, 0), (1, 0, 2)))
+#: Two walls of which one is in front, a lid in view on top, and what is inside: one action takes the lid off for good,
+#: so that the top shows the inside; the other turns the walls.
+BOX = SharedStructure(2, ((0, 3, 2, 3), (2, 1, 0, 3))).canonical()
+#: One register in view may come into both slots, which then cannot show it: slots never show the same.
+DOUBLE = SharedStructure(2, ((0, 2, 2), (1, 0, 2)))
 RING_WORLD = Assumptions(4, 6, ("turn", "swap"), PatternAlphabet(("left", "right"), 5))
 #: Nothing goes wrong, as far as rates allow.
 NEVER = Rates(slip=1e-12, wrong=1e-12, repeat=1e-12)
