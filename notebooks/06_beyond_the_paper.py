@@ -18,8 +18,8 @@
 #
 # In the paper every object is learned by itself: an action never tried may lead to any of the 132 patterns. But after a
 # *flip* the new front is always the old top, of every cube. This notebook shows what is gained by learning what all
-# objects share: registers that hold an object's symbols, and what each action makes of them. Nothing is
-# told about cubes.
+# objects share: registers that hold an object's symbols, and what each action makes of them. Nothing is told
+# about cubes.
 
 # %%
 import json
