@@ -91,8 +91,8 @@ def _sums(weights: FloatArray, cells: IntArray, n_cells: int) -> FloatArray:
     n_rows = math.prod(weights.shape[:-1])
     if n_rows > 1:
         cells = (n_cells * np.arange(n_rows)[:, None] + cells).ravel()
-    summed: FloatArray = np.bincount(cells, weights=weights.ravel(), minlength=n_rows * n_cells).astype(np.float64)
-    return summed.reshape(*weights.shape[:-1], n_cells)
+    summed = np.bincount(cells, weights=weights.ravel(), minlength=n_rows * n_cells)
+    return summed.astype(np.float64, copy=False).reshape(*weights.shape[:-1], n_cells)
 
 
 def arrivals(model: RecognitionModel, mass: FloatArray) -> FloatArray:
@@ -147,4 +147,4 @@ def expected_entropies_of(model: RecognitionModel, mass: FloatArray) -> FloatArr
         model: The tables in force.
         mass: p(O, X_t | z_0:t), or an approximation of it that sums to one, shape [H, W].
     """
-    return expected_entropies(model, next_pattern_joint(model, mass), float(mass.sum(axis=1)[-1]))
+    return expected_entropies(model, next_pattern_joint(model, mass), float(mass[-1].sum()))

@@ -82,13 +82,11 @@ def factor(keys: Sequence[int], table: FloatArray) -> Factor:
         raise InvalidInputError(
             f"factor on ({names(keys)}): shape {table.shape}; expected one axis a variable, none empty"
         )
-    values = table.ravel().tolist()
-    if not (min(values) >= 0 and sum(values) < np.inf):  # the sum of anything with a NaN is below nothing
+    if not (table.min() >= 0 and table.sum() < np.inf):  # the sum of anything with a NaN is below nothing
         raise InvalidInputError(f"factor on ({names(keys)}): expected finite values of at least 0")
     if 1 in table.shape:
         table = np.pad(table, [(0, cardinality(size) - size) for size in table.shape])
-        values = table.ravel().tolist()
-    return gtsam.DecisionTreeFactor(list(zip(keys, table.shape, strict=True)), values)
+    return gtsam.DecisionTreeFactor(list(zip(keys, table.shape, strict=True)), table.ravel().tolist())
 
 
 def cardinality(n_states: int) -> int:

@@ -112,6 +112,11 @@ class RecognitionModel:
         """W, the states of a hypothesis with its padding."""
         return self.pattern_of.shape[1]
 
+    @property
+    def states(self) -> IntArray:
+        """Flat indices (hypothesis, state) of all states but the padding, ascending."""
+        return np.flatnonzero(np.arange(self.n_states) <= self.n_known[:, None])
+
     def _refresh_aspects(self) -> None:
         """Make everything that follows from which aspects are known."""
         delta, n_patterns = self.parameters.observation_noise, self.n_patterns

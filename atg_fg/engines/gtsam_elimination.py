@@ -56,9 +56,12 @@ class GtsamElimination(FilterInference):
 
     def _correct(self, aspects: FloatArray, likelihood: FloatArray) -> FloatArray:
         """Multiply the prediction by the observation factor; (O, X_t) is one variable, since neither is summed out."""
-        predicted = factors.factor([_STATE], aspects.ravel())
-        observation = factors.factor([_STATE], likelihood.ravel())
-        return factors.vector(predicted * observation, aspects.size).reshape(aspects.shape)
+        states = self.model.states
+        predicted = factors.factor([_STATE], aspects.ravel()[states])
+        observation = factors.factor([_STATE], likelihood.ravel()[states])
+        joint = np.zeros(aspects.shape)
+        joint.ravel()[states] = factors.vector(predicted * observation, len(states))
+        return joint
 
     def _expected_entropies(self) -> FloatArray:
         """Return eq. 3, with p(O, z | a) as it is left by eliminating X_t."""
@@ -81,15 +84,19 @@ class TransitionFactors:
         edges = model.edges.chosen(chosen)
         self._rows = RowKinds(model.stay[[action]])
         self._base = CellFactor(self._rows.stay)
-        self._edges = EdgesInto(edges.hypothesis * model.n_states + edges.target, model.base.size)
+        self._states = model.states
+        cells = np.searchsorted(self._states, edges.hypothesis * model.n_states + edges.target)
+        self._edges = EdgesInto(cells, len(self._states))
         self._sources = model.edge_source[chosen]
-        self._next = CellFactor(self._edges.table(model.base.ravel(), model.edge_probability[chosen]))
+        self._next = CellFactor(self._edges.table(model.base.ravel()[self._states], model.edge_probability[chosen]))
 
     def next_aspects(self, mass: FloatArray) -> FloatArray:
         """Return Σ_x mass(i, x) p(x' | x, a, i), shape [H, W], from ``mass`` [H, W]."""
         kept = self._base.without_aspect(self._rows.belief(mass))
-        belief = self._edges.table(np.repeat(kept, mass.shape[1]), mass.ravel()[self._sources])
-        return self._next.without_aspect(belief_factor(belief)).reshape(mass.shape)
+        belief = self._edges.table(kept[self._states // mass.shape[1]], mass.ravel()[self._sources])
+        predicted = np.zeros(mass.shape)
+        predicted.ravel()[self._states] = self._next.without_aspect(belief_factor(belief))
+        return predicted
 
 
 class HypotheticalFactors:
