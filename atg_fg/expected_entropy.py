@@ -89,7 +89,7 @@ def _of_targets(model: RecognitionModel, values: FloatArray) -> FloatArray:
 def _sums(weights: FloatArray, cells: IntArray, n_cells: int) -> FloatArray:
     """Return the sum of all ``weights`` [..., R] whose cell, ``cells`` [R], is the same, shape [..., n_cells]."""
     n_rows = math.prod(weights.shape[:-1])
-    if n_rows > 1:
+    if n_rows != 1:
         cells = (n_cells * np.arange(n_rows)[:, None] + cells).ravel()
     summed = np.bincount(cells, weights=weights.ravel(), minlength=n_rows * n_cells)
     return summed.astype(np.float64, copy=False).reshape(*weights.shape[:-1], n_cells)
