@@ -232,6 +232,10 @@ class Score:
         if learned is not None and outcome.verdict == "novel":
             self._made_from[learned] = outcome.object
 
+    def has_met(self, presented: object) -> bool:
+        """Whether an object was presented in a trial before."""
+        return presented in self._presented
+
     def add_merges(self, merged: Sequence[Duplicate]) -> None:
         """Count merges; the merged ATG counts as made from the object of the one that was kept."""
         for each in merged:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Literal, TypeAlias
+from typing import Any, Final, Literal, TypeAlias
 
 import numpy as np
 
@@ -13,13 +13,15 @@ from atg_fg.assumptions import Assumptions
 from atg_fg.belief import IdentityBelief
 from atg_fg.engines.base import Inference
 from atg_fg.errors import InvalidInputError
-from atg_fg.json_format import plain_json
+from atg_fg.json_format import plain_json, write_assumptions
 from atg_fg.patterns import Detection, Evidence, FloatArray
 from atg_fg.policies import Policy
 from atg_fg.worlds import World, assumptions_of, detection_of
 
 #: How a trial can end.
 Verdict: TypeAlias = Literal["novel", "known", "lost", "undecided"]
+#: What the first line of a record says that it is.
+TRIAL_FORMAT: Final = "atg-fg/trial"
 
 
 @dataclass(frozen=True, eq=False)
@@ -105,10 +107,20 @@ class TrialRecord:
         """Index of each action, in order."""
         return [step.action for step in self.steps if step.action is not None]
 
-    def to_json_lines(self, **header: Any) -> str:
-        """Return the record as JSON lines: a header, a line a step, the verdict."""
-        lines: list[dict[str, Any]] = [{"format": "atg-fg/trial", "version": 1, "objects": self.names, **header}]
+    def to_json_lines(self, frames: Sequence[str] = (), **header: Any) -> str:
+        """Return the record as JSON lines: a header, a line a step, the verdict.
+
+        Args:
+            frames: Path of the camera picture of each look, from the record's folder, if there are any.
+            header: What else the header says.
+        """
+        assumptions = write_assumptions(self.assumptions)
+        lines: list[dict[str, Any]] = [
+            {"format": TRIAL_FORMAT, "version": 1, "objects": self.names, "assumptions": assumptions, **header}
+        ]
         lines += [self._step_line(time) for time in range(len(self.steps))]
+        for line, frame in zip(lines[1:], frames, strict=False):
+            line["frame"] = frame
         verdict = {"outcome": self.verdict, "judged_novel": self.judged_novel, "matched": self.matched}
         lines.append({"verdict": {**verdict, "truth": self.lost_truth or self.steps[-1].truth}})
         return "".join(json.dumps(line, default=plain_json, allow_nan=False) + "\n" for line in lines)

@@ -150,7 +150,12 @@ def summary_of(record: TrialRecord) -> dict[str, Any]:
 
 
 def read_trials(path: Path) -> list[dict[str, Any]]:
-    """Return the trials in a file as they were logged, without the header; half a trial at the end is left out.
+    """Return the trials in a file as they were logged, without the header; errors are those of ``read_log``."""
+    return read_log(path)[1]
+
+
+def read_log(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
+    """Return the header of a file and its trials as they were logged; half a trial at the end is left out.
 
     Raises:
         InvalidInputError: The file cannot be read, or is not such a file.
@@ -158,7 +163,7 @@ def read_trials(path: Path) -> list[dict[str, Any]]:
     lines, _ = _sound_lines(path)
     if not lines or {name: lines[0].get(name) for name in _FORMAT} != _FORMAT:
         raise InvalidInputError(f"{path}: is not a log of trials; expected a file that --records wrote")
-    return lines[1:]
+    return lines[0], lines[1:]
 
 
 def _member(line: Mapping[str, Any]) -> bytes:

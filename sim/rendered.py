@@ -83,7 +83,11 @@ class RenderedARcubeWorld(ARcubeWorld):
         """Return the last camera frame, RGB, shape [height, width, 3]; ``None`` without a render mode."""
         if self.render_mode is None:
             return None
-        return self.frame.copy() if self.render_mode == "rgb_array" else draw_detections(self.frame, self.markers)
+        return self.frame.copy() if self.render_mode == "rgb_array" else self.camera_picture()
+
+    def camera_picture(self) -> NDArray[np.uint8]:
+        """Return the last camera frame with the detected tags outlined, whatever the render mode."""
+        return draw_detections(self.frame, self.markers)
 
     def close(self) -> None:
         """Leave PyBullet; the world cannot be used any more."""

@@ -19,6 +19,7 @@ from atg_fg.cli import (
     explain,
     goal,
     memory,
+    report,
     rescore,
     structure,
     trials,
@@ -61,6 +62,7 @@ app.command()(goal.goal)
 app.command()(trials.trial)
 app.command()(trials.replay)
 app.command()(explain.explain)
+app.command()(report.report)
 app.command()(engines.compare)
 app.command()(engines.calibrate)
 app.command()(doctor.doctor)

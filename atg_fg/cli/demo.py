@@ -16,11 +16,12 @@ from atg_fg.cli import options
 from atg_fg.cli.story import Story
 from atg_fg.engines import begin_trial
 from atg_fg.experiments import learn_from
+from atg_fg.frames import FrameFolder, has_camera
 from atg_fg.memory import RobotMemory
 from atg_fg.policies import EntropyPolicy, RandomPolicy
 from atg_fg.presets import preset as preset_named
 from atg_fg.structure.memory import memory_for
-from atg_fg.trial import TrialRecord, run_trial
+from atg_fg.trial import TrialRecord, TrialStep, run_trial
 from atg_fg.worlds import World, check_arcube_world, make_world
 
 N_REMEMBERED = 6
@@ -72,6 +73,13 @@ def demo(
         rng = np.random.default_rng(trial_seed)
         presented = N_REMEMBERED if novel else int(rng.integers(N_REMEMBERED))
         story = Story(console, memory)
+        camera = FrameFolder(folder / "trial.jsonl", made_world) if has_camera(made_world) else None
+
+        def on_step(step: TrialStep) -> None:
+            story.tell(step)
+            if camera is not None:
+                camera.take()
+
         record = run_trial(
             made_world,
             begin_trial(engine, memory, parameters),
@@ -79,12 +87,14 @@ def demo(
             actions,
             rng,
             reset_options={"object": presented},
-            on_step=story.tell,
+            on_step=on_step,
         )
         story.verdict(record)
         truth = None if novel else record.names[presented]
         console.print(f"truth:   {truth or 'a new object'}")
-        _save(folder, made_world, record, memory)
+        header = {"engine": engine, "preset": preset, "world": world, "seed": seed}
+        lines = record.to_json_lines(camera.names if camera is not None else (), **header)
+        _save(folder, made_world, record, memory, lines)
     saved = [str(path) for path in sorted(folder.iterdir())]
     console.print(f"saved:   {', '.join(saved)}")
     document = {
@@ -106,7 +116,7 @@ def _learn(world: World, memory: RobotMemory, rng: np.random.Generator) -> None:
         memory.learn_shared(name, record.detections, record.actions)
 
 
-def _save(folder: Path, world: World, record: TrialRecord, memory: RobotMemory) -> None:
+def _save(folder: Path, world: World, record: TrialRecord, memory: RobotMemory, lines: str) -> None:
     """Save the film or the last camera frame, the plots, the record, and the memory with what the trial taught."""
     picture: Any = world.render() if world.render_mode else None
     if isinstance(picture, list):
@@ -124,6 +134,6 @@ def _save(folder: Path, world: World, record: TrialRecord, memory: RobotMemory) 
     chosen = [actions[action] for action in record.actions]
     figure = plots.plot_entropy([belief.entropy for belief in beliefs], expected, chosen)
     figures.save_figure(figure, folder / "entropy.png")
-    store.write_bytes_atomically(folder / "trial.jsonl", record.to_json_lines().encode())
+    store.write_bytes_atomically(folder / "trial.jsonl", lines.encode())
     learn_from(record, memory)
     store.save_memory(memory, folder / "memory.json")

@@ -17,7 +17,9 @@ from atg_fg.assumptions import arcube_assumptions
 from atg_fg.cli import options
 from atg_fg.cli.story import Story
 from atg_fg.engines import begin_trial
+from atg_fg.errors import InvalidInputError
 from atg_fg.experiments import learn_from
+from atg_fg.frames import FrameFolder
 from atg_fg.large_memory.files import load_any_memory, save_any_memory
 from atg_fg.memory import RobotMemory
 from atg_fg.policies import make_policy
@@ -25,7 +27,7 @@ from atg_fg.presets import preset as preset_named
 from atg_fg.scripted_trial import read_script
 from atg_fg.scripted_trial import replay as replay_script
 from atg_fg.structure.memory import memory_for
-from atg_fg.trial import run_trial
+from atg_fg.trial import TrialStep, run_trial
 from atg_fg.worlds import assumptions_of, make_world_with
 
 #: Objects of the world that ``atg-fg trial`` makes, |O|.
@@ -46,6 +48,9 @@ def trial(
         Path | None, typer.Option(help="Save the memory with what was learned to this file.")
     ] = None,
     record: Annotated[Path | None, typer.Option(help="Write the trial's record as JSON lines to this file.")] = None,
+    frames: Annotated[
+        bool, typer.Option("--frames", help="Save what the camera sees at each look in a folder beside the record.")
+    ] = False,
     seed: options.Seed = 0,
     cubes_seed: Annotated[int, typer.Option(help="Seed of the world's 100 objects, cubes or others.")] = 0,
     slip: options.Slip = 0.0,
@@ -66,6 +71,8 @@ def trial(
     for path in (save_memory, record):
         if path is not None:
             store.check_writable(path)
+    if frames and record is None:
+        raise InvalidInputError("--frames: no record to keep them with; expected --record FILE")
     chosen_policy = make_policy(policy, settled)
     parameters = preset_named(preset)
     engine = options.engine_of(engine, parameters, "gtsam")
@@ -77,13 +84,20 @@ def trial(
         inference = begin_trial(engine, remembered, parameters)
         story = Story(options.console(json_file), remembered)
         rng = np.random.default_rng(np.random.SeedSequence(seed))
-        result = run_trial(made_world, inference, chosen_policy, actions, rng, on_step=story.tell)
+        camera = FrameFolder(record, made_world) if frames and record is not None else None
+
+        def on_step(step: TrialStep) -> None:
+            story.tell(step)
+            if camera is not None:
+                camera.take()
+
+        result = run_trial(made_world, inference, chosen_policy, actions, rng, on_step=on_step)
     story.verdict(result)
     learned = learn_from(result, remembered)
     header: dict[str, Any] = {"engine": engine, "policy": policy, "preset": preset, "world": world, "seed": seed}
     if settled is not None:
         header["settled"] = settled
-    lines = result.to_json_lines(**header)
+    lines = result.to_json_lines(camera.names if camera is not None else (), **header)
     if record is not None:
         store.write_bytes_atomically(record, lines.encode())
     if save_memory is not None:

@@ -138,8 +138,12 @@ class RobonautARcubeWorld(ARcubeWorld):
         if self.render_mode == "head":
             return self.frame.copy()
         if self.render_mode == "detections":
-            return draw_detections(self.frame, self.markers)
+            return self.camera_picture()
         return None if self._film is None else self._film.take()
+
+    def camera_picture(self) -> NDArray[np.uint8]:
+        """Return the last frame of the head's camera with the detected tags outlined, whatever the render mode."""
+        return draw_detections(self.frame, self.markers)
 
     def save(self) -> Snapshot:
         """Keep the whole state of the world between two actions of a trial, its random generator included."""
@@ -199,7 +203,7 @@ class RobonautARcubeWorld(ARcubeWorld):
         self.controller.hold(_SETTLING)
         self.camera = self._head_camera()
         if self._film is not None:
-            self._film.begin(self.scene, self._inset, self._observer)
+            self._film.begin(self.scene, self.camera_picture, self._observer)
 
     def _build(self) -> None:
         """Make the scene anew, and the robot's control of it."""
@@ -258,9 +262,6 @@ class RobonautARcubeWorld(ARcubeWorld):
 
     def _observer(self) -> Camera:
         return OBSERVER
-
-    def _inset(self) -> NDArray[np.uint8]:
-        return draw_detections(self.frame, self.markers)
 
     def _truth(self, *, slipped: bool) -> dict[str, Any]:
         position, rotation = self.scene.cube_pose()

@@ -1,0 +1,66 @@
+"""The ATGs of a trial's hypotheses, placed for drawing: what was remembered, and what the trial adds."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+from atg_fg.assumptions import Assumptions
+from atg_fg.graph import AspectTransitionGraph
+from atg_fg.memory import RobotMemory
+from atg_fg.patterns import Detection, Evidence
+from atg_fg.report.content import PlacedGraph
+
+#: What the graph of an object is called that no ATG is remembered of.
+NEW_OBJECT = "a new object"
+UNKNOWN_MEMORY = "what the trial has shown"
+
+
+class TrialGraphs:
+    """Collects the ATGs that the looks of one trial need.
+
+    Args:
+        memory: That the trial began with; ``None`` if it is not known.
+        assumptions: Of the trial.
+        seen: The detections of all its looks.
+        actions: Names of its actions, one less at least.
+    """
+
+    def __init__(
+        self, memory: RobotMemory | None, assumptions: Assumptions, seen: Sequence[Detection], actions: Sequence[str]
+    ) -> None:
+        self._memory = memory
+        self._assumptions = assumptions
+        self._patterns = [Evidence.of_detection(assumptions.alphabet, each).pattern for each in seen]
+        self._actions = [assumptions.actions.index(action) for action in actions][: len(seen) - 1]
+        self._graphs: dict[str | None, PlacedGraph] = {}
+
+    def index_of(self, name: str | None) -> int:
+        """Return the index of an object's ATG in ``graphs``; ``None`` stands for an object never met."""
+        known = name if self._memory is not None and name in self._memory.names else None
+        if known not in self._graphs:
+            self._graphs[known] = self._placed(known)
+        return list(self._graphs).index(known)
+
+    @property
+    def graphs(self) -> tuple[PlacedGraph, ...]:
+        """The graphs asked for so far."""
+        return tuple(self._graphs.values())
+
+    def _placed(self, name: str | None) -> PlacedGraph:
+        new = UNKNOWN_MEMORY if self._memory is None else NEW_OBJECT
+        if name is None or self._memory is None:
+            before, title = AspectTransitionGraph("new", self._assumptions), new
+        else:
+            before, title = self._memory[name], name
+        after = before.copy()
+        after.learn(self._patterns, self._actions)
+        edges = tuple((*edge, count) for edge, count in sorted(before.counts.items()))
+        return PlacedGraph(title, before.n_known, after.aspects, _circle(after.n_known), edges)
+
+
+def _circle(n_aspects: int) -> tuple[tuple[float, float], ...]:
+    """Return the middle of each aspect: on a circle that is wide enough, from its top clockwise."""
+    radius = max(2.6, 1.9 * n_aspects / (2 * math.pi)) if n_aspects > 1 else 1.8
+    angles = [math.pi / 2 - 2 * math.pi * aspect / n_aspects for aspect in range(n_aspects)]
+    return tuple((round(radius * math.cos(angle), 4), round(radius * math.sin(angle), 4)) for angle in angles)

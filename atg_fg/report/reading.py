@@ -1,0 +1,75 @@
+"""Any file that a report can be made of, told apart by what is in it."""
+
+from __future__ import annotations
+
+import json
+import zlib
+from pathlib import Path
+from typing import Any, Final
+
+from atg_fg.errors import InvalidInputError
+from atg_fg.json_format import parse_json
+from atg_fg.memory import RobotMemory
+from atg_fg.report.content import Report
+from atg_fg.report.experiments import EXPERIMENTS, read_experiment
+from atg_fg.report.goal_run import GOAL_RUN_FORMAT, read_goal_run
+from atg_fg.report.test_log import read_test_log
+from atg_fg.report.trial_record import read_trial_record
+from atg_fg.store import read_text_file
+from atg_fg.trial import TRIAL_FORMAT
+
+_GZIP: Final = b"\x1f\x8b"
+_EXPECTED: Final = (
+    "expected a trial's record (trial --record), the trials of a test (table1 --records), a run (goal --records), "
+    f"or a result (--json) of: {', '.join(EXPERIMENTS)}"
+)
+
+
+def read_report(path: Path, memory: RobotMemory | None = None) -> Report:
+    """Return the page of a file.
+
+    Args:
+        path: A trial's record, the trials of a test, a run of the goal experiment, or the JSON of an experiment.
+        memory: That the trial began with, if it is at hand.
+
+    Raises:
+        InvalidInputError: The file cannot be read, is of no kind that there is a page for, or has a fault in it.
+    """
+    try:
+        with path.open("rb") as file:
+            start = file.read(4096)
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else error
+        raise InvalidInputError(f"{path}: cannot be read: {reason}; {_EXPECTED}") from error
+    if start.startswith(_GZIP):
+        return read_goal_run(path, memory) if _is_goal_run(start) else read_test_log(path, memory)
+    text = read_text_file(path)
+    if _first_line(text).get("format") == TRIAL_FORMAT:
+        return read_trial_record(text, path, memory)
+    document = parse_json(text, str(path))
+    if isinstance(document, dict) and document.get("command") in EXPERIMENTS:
+        return read_experiment(document, str(path))
+    raise InvalidInputError(f"{path}: {_what_it_says(document)}; {_EXPECTED}")
+
+
+def _is_goal_run(start: bytes) -> bool:
+    """Whether a gzipped file begins like a run; its first line may be longer than what was read."""
+    try:
+        text = zlib.decompressobj(31).decompress(start)
+    except zlib.error:
+        return False
+    return GOAL_RUN_FORMAT.encode() in text[:200]
+
+
+def _first_line(text: str) -> dict[str, Any]:
+    try:
+        line = json.loads(text.split("\n", 1)[0])
+    except (ValueError, RecursionError):
+        return {}
+    return line if isinstance(line, dict) else {}
+
+
+def _what_it_says(document: Any) -> str:
+    if isinstance(document, dict) and ("command" in document or "format" in document):
+        return f"is of {document.get('command', document.get('format'))!r}"
+    return "says neither a command nor a format"
