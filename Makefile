@@ -16,7 +16,8 @@ setup: $(READY)  ## Install everything into .venv
 $(READY): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1'
-	$(BIN)/python -m pip install --quiet --editable '.[sim,viz,notebooks]' --group test --group dev --group docs
+	$(BIN)/python -m pip install --quiet --editable '.[sim,viz,report,viewer,notebooks]' \
+		--group test --group dev --group docs
 	touch $@
 
 demo: $(READY)  ## Let the robot recognise an object by turning it over, told step by step and filmed

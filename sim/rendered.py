@@ -18,6 +18,7 @@ from sim.camera import Camera
 from sim.cube_body import CUBE_CENTRE, CUBE_SIZE, CubeBody, rotation_of
 from sim.detection import Marker, detect_markers, detected_symbols, draw_detections
 from sim.imaging import Imaging, at_least_zero
+from sim.viewer import log_camera, log_cube, log_links, log_pose, log_shapes, log_world
 
 _MOST_PIXELS: Final = 2048
 _WOOD, _FLOOR = [0.66, 0.50, 0.34, 1.0], [0.80, 0.82, 0.84, 1.0]
@@ -74,10 +75,11 @@ class RenderedARcubeWorld(ARcubeWorld):
         self._client = pybullet.connect(pybullet.DIRECT)
         # A world that nobody closes must not keep its client until the process ends.
         self._disconnect = weakref.finalize(self, pybullet.disconnect, physicsClientId=self._client)
-        self._build_table()
+        self._table = self._build_table()
         self._cube = CubeBody(self._client)
         self._offset = np.zeros(3)
         self._yaw = 0.0
+        self._recording: Any = None
 
     def render(self) -> NDArray[np.uint8] | None:
         """Return the last camera frame, RGB, shape [height, width, 3]; ``None`` without a render mode."""
@@ -89,19 +91,29 @@ class RenderedARcubeWorld(ARcubeWorld):
         """Return the last camera frame with the detected tags outlined, whatever the render mode."""
         return draw_detections(self.frame, self.markers)
 
+    def show_in(self, recording: Any) -> None:
+        """Show the cube and what the camera sees in a Rerun recording, from the next reset on."""
+        self._recording = recording
+        log_world(recording)
+        log_shapes(recording, "world/table_0", self._client, self._table)
+        log_links(recording, "world/table_0", self._client, self._table)
+
     def close(self) -> None:
         """Leave PyBullet; the world cannot be used any more."""
         self._disconnect()
         self._client = -1
 
-    def _build_table(self) -> None:
+    def _build_table(self) -> int:
+        """Make table and floor, and return the table."""
         half_sizes = ([0.32, 0.40, 0.02], _WOOD), ([4.0, 4.0, 0.01], _FLOOR)
         table_top = CUBE_CENTRE[2] - CUBE_SIZE / 2
+        bodies = []
         for (half_size, colour), height in zip(half_sizes, (table_top - 0.02, -0.5), strict=True):
             shape = pybullet.createVisualShape(
                 pybullet.GEOM_BOX, halfExtents=half_size, rgbaColor=colour, physicsClientId=self._client
             )
-            pybullet.createMultiBody(0, -1, shape, [0.5, 0.0, height], physicsClientId=self._client)
+            bodies.append(pybullet.createMultiBody(0, -1, shape, [0.5, 0.0, height], physicsClientId=self._client))
+        return int(bodies[0])
 
     def _place(self) -> None:
         """Put the cube down in its orientation, a little off as the jitter options say."""
@@ -112,6 +124,9 @@ class RenderedARcubeWorld(ARcubeWorld):
             self._yaw = float(np.radians(self.np_random.uniform(-1, 1) * self.yaw_jitter))
         self._cube.show(self.cubes[self.object])
         self._cube.place(CUBE_CENTRE + self._offset, self.cube_rotation)
+        if self._recording is not None:
+            log_cube(self._recording, "world/cube_0", self.cubes[self.object])
+            log_pose(self._recording, "world/cube_0", *self._cube.pose())
 
     @property
     def cube_rotation(self) -> FloatArray:
@@ -124,6 +139,8 @@ class RenderedARcubeWorld(ARcubeWorld):
         """Take a frame and return the symbols detected in it."""
         self.frame = self.imaging.frame(self.camera, self._client, self.np_random)
         self.markers = detect_markers(self.frame, self.camera)
+        if self._recording is not None:
+            log_camera(self._recording, self.camera, self.camera_picture())
         return detected_symbols(self.markers)
 
     def _truth(self, *, slipped: bool) -> dict[str, Any]:

@@ -7,6 +7,7 @@ import pytest
 from atg_fg.assumptions import arcube_assumptions
 from atg_fg.engines import begin_trial
 from atg_fg.errors import InvalidInputError
+from atg_fg.json_format import read_assumptions
 from atg_fg.memory import RobotMemory
 from atg_fg.policies import EntropyPolicy, RandomPolicy
 from atg_fg.presets import preset
@@ -65,6 +66,7 @@ def test_every_engine_leaves_the_same_record(empty):
 def test_the_record_holds_every_step_as_json_lines(empty):
     lines = [json.loads(line) for line in a_trial(empty, n_actions=3).to_json_lines(seed=0).splitlines()]
     header, *steps, last = lines
+    assert read_assumptions(header.pop("assumptions"), "header") == empty.assumptions
     assert header == {"format": "atg-fg/trial", "version": 1, "objects": [], "seed": 0}
     assert [step["step"] for step in steps] == [0, 1, 2, 3]
     assert set(steps[0]["expected_entropy"]) == {"flip", "left", "right"}

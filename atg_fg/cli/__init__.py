@@ -24,6 +24,7 @@ from atg_fg.cli import (
     structure,
     trials,
     uai,
+    watch,
 )
 from atg_fg.errors import AtgError
 
@@ -63,6 +64,7 @@ app.command()(trials.trial)
 app.command()(trials.replay)
 app.command()(explain.explain)
 app.command()(report.report)
+app.command()(watch.watch)
 app.command()(engines.compare)
 app.command()(engines.calibrate)
 app.command()(doctor.doctor)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -10,14 +11,15 @@ import numpy as np
 import typer
 
 from atg_fg import figures, plots, store
-from atg_fg.arcube import make_arcubes
+from atg_fg.arcube import Cube, make_arcubes
 from atg_fg.assumptions import arcube_assumptions
 from atg_fg.cli import options
 from atg_fg.cli.story import Story
-from atg_fg.engines import begin_trial
+from atg_fg.engines import begin_trial, check_engine
 from atg_fg.experiments import learn_from
 from atg_fg.frames import FrameFolder, has_camera
 from atg_fg.memory import RobotMemory
+from atg_fg.parameters import ModelParameters
 from atg_fg.policies import EntropyPolicy, RandomPolicy
 from atg_fg.presets import preset as preset_named
 from atg_fg.structure.memory import memory_for
@@ -61,13 +63,11 @@ def demo(
     folder = store.make_folder(output)
     console = options.console(json_file)
     learn_seed, trial_seed = np.random.SeedSequence(seed).spawn(2)
-    memory = memory_for(parameters, RobotMemory(arcube_assumptions()))
-    begin_trial(engine, memory, parameters)
+    check_engine(engine, parameters)
     # The last cube is the one the robot never meets while it learns.
     cubes = make_arcubes(N_REMEMBERED + 1, seed)
     console.print(f"The robot remembers {N_REMEMBERED} cubes that it turned over before.")
-    with closing(make_world("ideal", cubes=cubes)) as ideal_world:
-        _learn(ideal_world, memory, np.random.default_rng(learn_seed))
+    memory = learn_beforehand(cubes, parameters, np.random.default_rng(learn_seed))
     world_options = {**CAMERAS.get(world, {}), **options.world_options(condition=condition, urdf=urdf)}
     with closing(make_world(world, cubes=cubes, **world_options)) as made_world:
         rng = np.random.default_rng(trial_seed)
@@ -107,13 +107,19 @@ def demo(
     options.write_json({**document, "saved": saved}, json_file)
 
 
-def _learn(world: World, memory: RobotMemory, rng: np.random.Generator) -> None:
-    """Turn each cube over at random, twelve times, knowing that it is new."""
-    for cube in range(N_REMEMBERED):
-        inference = begin_trial("bayes-filter", memory, preset_named("default"))
-        record = run_trial(world, inference, RandomPolicy(), 12, rng, reset_options={"object": cube})
-        name = memory.learn(record.patterns, record.actions, matched=None)
-        memory.learn_shared(name, record.detections, record.actions)
+def learn_beforehand(cubes: Sequence[Cube], parameters: ModelParameters, rng: np.random.Generator) -> RobotMemory:
+    """Return the memory of a robot that turned each of the first six cubes over at random, twelve times.
+
+    It did so in the ideal world, and knew that each was new.
+    """
+    memory = memory_for(parameters, RobotMemory(arcube_assumptions()))
+    with closing(make_world("ideal", cubes=cubes)) as world:
+        for cube in range(N_REMEMBERED):
+            inference = begin_trial("bayes-filter", memory, preset_named("default"))
+            record = run_trial(world, inference, RandomPolicy(), 12, rng, reset_options={"object": cube})
+            name = memory.learn(record.patterns, record.actions, matched=None)
+            memory.learn_shared(name, record.detections, record.actions)
+    return memory
 
 
 def _save(folder: Path, world: World, record: TrialRecord, memory: RobotMemory, lines: str) -> None:

@@ -27,6 +27,7 @@ from sim.robot.manipulation import Manipulator, OutOfReachError
 from sim.robot.perception import cube_pose
 from sim.robot.plans import CubePose
 from sim.robot.scene import PlacedCube, Scene
+from sim.robot.viewer import SceneViewer
 
 #: An action is right if it leaves the cube this near to where it should, degrees and m.
 RIGHT_ANGLE: Final = 20.0
@@ -108,6 +109,7 @@ class RobonautARcubeWorld(ARcubeWorld):
         self._seen_at = -1
         self._outcome: dict[str, Any] = {}
         self._film = Film(self.metadata["render_fps"]) if render_mode == "rgb_array_list" else None
+        self._viewer: SceneViewer | None = None
 
     def step(self, action: np.int64) -> tuple[IntArray, float, bool, bool, dict[str, Any]]:
         """Let the robot act and look.
@@ -144,6 +146,10 @@ class RobonautARcubeWorld(ARcubeWorld):
     def camera_picture(self) -> NDArray[np.uint8]:
         """Return the last frame of the head's camera with the detected tags outlined, whatever the render mode."""
         return draw_detections(self.frame, self.markers)
+
+    def show_in(self, recording: Any) -> None:
+        """Show the scene of each trial from the next reset on in a Rerun recording (``sim.robot.viewer``)."""
+        self._viewer = SceneViewer(recording)
 
     def save(self) -> Snapshot:
         """Keep the whole state of the world between two actions of a trial, its random generator included."""
@@ -204,6 +210,8 @@ class RobonautARcubeWorld(ARcubeWorld):
         self.camera = self._head_camera()
         if self._film is not None:
             self._film.begin(self.scene, self.camera_picture, self._observer)
+        if self._viewer is not None:
+            self._viewer.begin(self.scene, [cube.tags for cube in self._placed_cubes()])
 
     def _build(self) -> None:
         """Make the scene anew, and the robot's control of it."""
@@ -239,6 +247,8 @@ class RobonautARcubeWorld(ARcubeWorld):
 
     def _detect(self) -> tuple[int, int]:
         self._see()
+        if self._viewer is not None:
+            self._viewer.look(self.camera.moved(self.scene.robot.place), self.camera_picture())
         return detected_symbols(self.markers)
 
     def _see(self) -> None:

@@ -24,8 +24,10 @@ def test_the_demo_recognises_an_object_from_camera_images(run, tmp_path):
         "entropy.png",
         "frame.png",
         "memory.json",
+        "trial.frames",
         "trial.jsonl",
     ]
+    assert len(os.listdir(tmp_path / "out" / "trial.frames")) == 6
     assert len(store.load_memory(tmp_path / "out" / "memory.json")) == 6
 
 

@@ -1,0 +1,75 @@
+"""``atg-fg watch``: one recognition trial in the Rerun viewer, or as a recording for it."""
+
+from __future__ import annotations
+
+from contextlib import closing
+from pathlib import Path
+from typing import Annotated
+
+import numpy as np
+import typer
+
+from atg_fg.arcube import make_arcubes
+from atg_fg.cli import options
+from atg_fg.cli.demo import N_REMEMBERED, learn_beforehand
+from atg_fg.cli.story import Story
+from atg_fg.engines import begin_trial, check_engine
+from atg_fg.policies import make_policy
+from atg_fg.presets import preset as preset_named
+from atg_fg.trial import TrialStep, run_trial
+from atg_fg.viewer import TrialViewer, check_path, import_rerun
+from atg_fg.worlds import check_arcube_world, make_world
+
+
+def watch(
+    world: options.ARcubeWorld = "robonaut",
+    engine: options.PresetsEngine = None,
+    preset: options.Preset = "default",
+    policy: options.Policy = "entropy",
+    actions: options.Actions = 8,
+    novel: Annotated[bool, typer.Option("--novel", help="Present an object the robot has never met.")] = False,
+    save: Annotated[
+        Path | None, typer.Option(help="Save a recording (.rrd) instead of opening the viewer; needs no screen.")
+    ] = None,
+    condition: options.Condition = None,
+    urdf: options.Urdf = None,
+    seed: options.Seed = 0,
+) -> None:
+    """Watch the robot recognise one of six objects it remembers: the scene in 3D, belief and entropy.
+
+    The memory is learned beforehand, from the same objects turned at random in the ideal world.
+
+    Example: atg-fg watch --world robonaut --save trial.rrd
+    """
+    check_arcube_world("--world", world)
+    options.check_at_least(1, actions=actions)
+    options.check_at_least(0, seed=seed)
+    import_rerun()  # fails now rather than after the memory is learned, if it is not installed
+    if save is not None:
+        check_path(save)
+    parameters = preset_named(preset)
+    engine = options.engine_of(engine, parameters, "bayes-filter")
+    check_engine(engine, parameters)
+    chosen_policy = make_policy(policy)
+    cubes = make_arcubes(N_REMEMBERED + 1, seed)
+    learn_seed, trial_seed = np.random.SeedSequence(seed).spawn(2)
+    memory = learn_beforehand(cubes, parameters, np.random.default_rng(learn_seed))
+    with closing(make_world(world, cubes=cubes, **options.world_options(condition=condition, urdf=urdf))) as made_world:
+        viewer = TrialViewer(made_world, memory, save)
+        story = Story(options.console(), memory)
+        rng = np.random.default_rng(trial_seed)
+        presented = N_REMEMBERED if novel else int(rng.integers(N_REMEMBERED))
+
+        def on_step(step: TrialStep) -> None:
+            story.tell(step)
+            viewer.tell(step)
+
+        inference = begin_trial(engine, memory, parameters)
+        record = run_trial(
+            made_world, inference, chosen_policy, actions, rng, reset_options={"object": presented}, on_step=on_step
+        )
+        story.verdict(record)
+        viewer.verdict(record)
+        viewer.close()
+    if save is not None:
+        typer.echo(f"saved: {save}")

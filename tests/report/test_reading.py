@@ -1,0 +1,216 @@
+"""What a page is told of each kind of file."""
+
+import gzip
+import json
+from pathlib import Path
+
+import pytest
+
+from atg_fg.errors import InvalidInputError
+from atg_fg.report.experiments import EXPERIMENTS
+from atg_fg.report.reading import read_report
+from atg_fg.trial_log import read_log
+
+RESULTS = Path(__file__).parents[2] / "results"
+
+
+def changed(record, change):
+    lines = [json.loads(line) for line in record.read_text().splitlines()]
+    change(lines)
+    record.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    return record
+
+
+def test_a_record_is_told_look_by_look(trial, record):
+    memory, run = trial
+    report = read_report(record, memory)
+    (page,) = report.trials
+    assert (page.verdict, page.right) == ("object-000", None)
+    assert [look.seen for look in page.looks] == run.detections
+    assert [look.entropy for look in page.looks] == [step.belief.entropy for step in run.steps]
+    assert page.looks[-1].objects[0] == ("object-000", float(run.belief.objects[0]))
+    assert dict(page.looks[0].expected) == dict(
+        zip(("flip", "left", "right"), run.steps[0].expected_entropies.tolist(), strict=True)
+    )
+    assert report.parameters == {"seed": "1", "preset": "default"}
+
+
+def test_each_look_points_at_the_graph_of_its_best_hypothesis(trial, record):
+    memory, run = trial
+    (page,) = read_report(record, memory).trials
+    graphs = [page.graphs[look.graph].name for look in page.looks]
+    assert graphs == [
+        "a new object" if step.belief.unseen > step.belief.objects[0] else "object-000" for step in run.steps
+    ]
+    graph = next(graph for graph in page.graphs if graph.name == "object-000")
+    remembered = memory["object-000"]
+    assert graph.aspects[: graph.remembered] == remembered.aspects
+    assert {edge[:3]: edge[3] for edge in graph.edges} == remembered.counts
+    seen = {look.seen for look in page.looks if None not in look.seen}
+    assert set(graph.aspects) == set(remembered.aspects) | seen
+
+
+def test_without_a_memory_the_graph_is_of_the_trial_and_a_note_says_so(record):
+    report = read_report(record)
+    assert {graph.name for graph in report.trials[0].graphs} == {"what the trial has shown"}
+    assert report.trials[0].graphs[0].remembered == 0
+    assert "--memory" in report.notes[0]
+
+
+def test_a_record_without_assumptions_is_of_arcubes(record):
+    changed(record, lambda lines: lines[0].pop("assumptions"))
+    assert read_report(record).assumptions.actions == ("flip", "left", "right")
+
+
+def test_what_a_test_leaves_out_is_inferred_again(test_log):
+    report = read_report(test_log)
+    _, summaries = read_log(test_log)
+    assert len(report.trials) == len(summaries) == 12
+    assert report.notes == ()
+    assert report.title == f"A test of 12 trials, {sum(page.right for page in report.trials)} of them right"
+    for page, summary in zip(report.trials, summaries, strict=True):
+        # The recorded figures are shown as they are; the inferred objects make up what is left of them.
+        assert [look.unseen for look in page.looks] == summary["unseen"]
+        for look in page.looks:
+            assert sum(share for _, share in look.objects) + look.unseen == pytest.approx(1.0, abs=1e-9)
+        chosen = [dict(look.expected)[look.action] for look in page.looks if look.action]
+        least = [min(dict(look.expected).values()) for look in page.looks if look.action]
+        assert chosen == pytest.approx(least, abs=1e-9)
+    known = [page for page in report.trials if page.verdict.startswith("object-")]
+    assert known
+    for page in known:
+        assert page.graphs[page.looks[-1].graph].name == page.verdict
+        assert page.looks[-1].objects[0][0] == page.verdict
+
+
+def test_a_belief_that_does_not_lead_to_what_was_recorded_is_not_shown(test_log, tmp_path):
+    header, summaries = read_log(test_log)
+    summaries[5]["unseen"][1] = 0.123
+    other = tmp_path / "test-0003.jsonl.gz"
+    other.write_bytes(b"".join(gzip.compress(json.dumps(line).encode() + b"\n") for line in [header, *summaries]))
+    report = read_report(other)
+    assert [bool(page.looks[0].objects) for page in report.trials[4:7]] == [True, False, False]
+    assert "not inferred again" in report.notes[0]
+
+
+def test_whether_a_trial_was_right_is_by_the_truth():
+    report = read_report(RESULTS / "robonaut" / "worn_default" / "test-0000.jsonl.gz")
+    result = json.loads((RESULTS / "table1_robonaut_worn_default.json").read_text())
+    assert sum(page.right for page in report.trials) == round(100 * result["tests"][0]["success"])
+
+
+def test_a_run_has_a_trial_a_station_with_its_goal(goal_run):
+    report = read_report(goal_run)
+    served = json.loads(gzip.decompress(goal_run.read_bytes()))["served"]
+    assert [page.goal for page in report.trials] == [tuple(entry["goal"]) for entry in served]
+    assert all(page.right for page in report.trials)
+    assert {look.purpose for page in report.trials for look in page.looks} >= {"recognise"}
+
+
+@pytest.mark.parametrize(
+    ("result", "tables", "plots"),
+    [
+        ("table1_paper", 2, 1), ("figure3_default", 1, 1), ("ablation", 4, 4), ("ablation_other_worlds", 4, 4),
+        ("goal_learned", 2, 1), ("compare", 1, 1), ("rescore_learned", 1, 1), ("calibrate_gibbs", 1, 1),
+        ("reliability_worn", 2, 2),
+    ],
+)  # fmt: skip
+def test_a_result_becomes_tables_and_plots(result, tables, plots):
+    report = read_report(RESULTS / f"{result}.json")
+    assert (len(report.tables), len(report.plots)) == (tables, plots)
+    assert all(len(row) == len(table.columns) for table in report.tables for row in table.rows)
+    for plot in report.plots:
+        for point in (point for series in plot.series for point in series.points if point.low is not None):
+            assert 0 <= point.low <= point.y <= point.high <= 100
+
+
+def test_the_figures_of_a_result_are_those_of_the_file():
+    table = read_report(RESULTS / "table1_paper.json").tables[0]
+    assert table.rows[2] == ("success", "79.4 %", "78.1–80.6 %", "0.8 %")
+    points = read_report(RESULTS / "figure3_paper.json").plots[0].series[0].points
+    assert (points[0].x, points[0].y, points[0].low) == (4.0, pytest.approx(67.8), pytest.approx(64.8, abs=0.05))
+
+
+def test_every_result_of_the_repository_has_a_page():
+    files = [path for path in RESULTS.glob("*.json") if json.loads(path.read_text())["command"] in EXPERIMENTS]
+    assert len(files) >= 30
+    for path in files:
+        assert read_report(path).tables, path
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda lines: lines[1].pop("entropy"), "line 2: key 'entropy' is missing"),
+        (lambda lines: lines[2].update(entropy=True), "line 3: entropy: True; expected a number"),
+        (lambda lines: lines[2].update(unseen=1.5), "line 3: unseen: 1.5; expected a number from 0 to 1"),
+        (lambda lines: lines[1].update(objects=[0.1, 0.2]), "line 2: objects: 2 numbers; expected 1"),
+        (lambda lines: lines[1].update(observed=[3, 99]), "line 2: observed"),
+        (lambda lines: lines[1].update(observed="front"), "line 2: observed: 'front'; expected a list"),
+        (lambda lines: lines[1].update(action="jump"), "line 2: action: 'jump'; expected one of: flip, left, right"),
+        (lambda lines: lines[1].update(expected_entropy=[1]), "line 2: expected_entropy"),
+        (lambda lines: lines[0].update(version=2), "line 1: version: 2; expected 1"),
+        (lambda lines: lines[-1].clear(), "key 'verdict' is missing"),
+        (lambda lines: lines.__delitem__(slice(1, None)), "1 lines; expected a header, a line a look and the verdict"),
+    ],
+)
+def test_a_fault_in_a_record_is_named(record, change, message):
+    changed(record, change)
+    with pytest.raises(InvalidInputError) as refusal:
+        read_report(record)
+    assert f"{record}: " in str(refusal.value)
+    assert message in str(refusal.value)
+
+
+def test_pictures_come_from_the_records_folder_alone(record, tmp_path):
+    secret = tmp_path.parent / f"{tmp_path.name}.png"
+    secret.write_bytes(b"\x89PNG\r\n\x1a\n")
+    (tmp_path / "text.png").write_text("no picture")
+    (tmp_path / "link.png").symlink_to(secret)
+    for frame in (f"../{secret.name}", str(secret), "text.png", "link.png", "absent.png", 7, "", "a\0b"):
+        changed(record, lambda lines, frame=frame: lines[1].update(frame=frame))
+        with pytest.raises(InvalidInputError, match=r"line 2: frame: .* (expected|cannot be read)"):
+            read_report(record)
+    (tmp_path / "good.png").write_bytes(b"\x89PNG\r\n\x1a\nrest")
+    changed(record, lambda lines: lines[1].update(frame="good.png"))
+    assert read_report(record).trials[0].looks[0].frame == "data:image/png;base64,iVBORw0KGgpyZXN0"
+
+
+def test_another_memory_is_refused(trial, record):
+    changed(record, lambda lines: lines[0].update(objects=["other"]))
+    with pytest.raises(InvalidInputError, match=r"--memory: 1 objects; expected the memory of the trial, .* other"):
+        read_report(record, trial[0])
+
+
+@pytest.mark.parametrize(
+    ("content", "message"),
+    [
+        (b"", "not valid JSON"),
+        (b"{", "not valid JSON"),
+        (b"[1]", "says neither a command nor a format"),
+        (b'{"format": "atg-fg/memory"}', "is of 'atg-fg/memory'; expected a trial's record"),
+        (b'{"command": "table1"}', "expected a result that atg-fg table1 --json wrote"),
+        (b'{"command": "figure3", "points": [{"actions": "x"}]}', "expected a result that atg-fg figure3"),
+        (b"\xff\xfe", "not a UTF-8 text file"),
+        (b"\x1f\x8b\x08 broken", "cannot be read"),
+        (gzip.compress(b'{"format": "atg-fg/goal-run", "version": 1}'), "key 'served' is missing"),
+        (gzip.compress(b'{"format": "atg-fg/test", "version": 1}\n'), "no trials; expected at least one"),
+        (gzip.compress(b'{"format": "atg-fg/test", "version": 1, "world": "os:x"}\n') + gzip.compress(b"{}\n"),
+         "is no world of this package"),
+        (gzip.compress(b'{"format": "atg-fg/test", "version": 1}\n') + gzip.compress(b"{}\n"),
+         "trial 0: key 'observed' is missing"),
+        (b"[" * 100_000, "not valid JSON"),
+    ],
+)  # fmt: skip
+def test_a_file_of_another_kind_is_refused(tmp_path, content, message):
+    path = tmp_path / "file"
+    path.write_bytes(content)
+    with pytest.raises(InvalidInputError) as refusal:
+        read_report(path)
+    assert str(path) in str(refusal.value)
+    assert message in str(refusal.value)
+
+
+def test_a_file_that_is_not_there_is_refused(tmp_path):
+    with pytest.raises(InvalidInputError, match="absent: cannot be read"):
+        read_report(tmp_path / "absent")
