@@ -67,8 +67,10 @@ class TrialViewer:
         self._assumptions = memory.assumptions
         self._names = memory.names
         self._look = 0
-        # One identity for all: the same trial is the same recording, whenever it is run.
-        self.recording = self._rerun.RecordingStream("atg-fg", recording_id="atg-fg-trial")
+        self.recording = self._rerun.RecordingStream("atg-fg")
+        # When it was run is no part of a trial.
+        self.recording.set_log_time_enabled(False)
+        self.recording.set_log_tick_enabled(False)
         self._kept = self.recording.memory_recording() if save is not None else None
         if save is None:
             self._open()

@@ -27,7 +27,7 @@ class Look:
         purpose: What the action is for, if the policy says so.
         shown: The pattern that was shown, by the world's truth, if the truth says so.
         slipped: Whether the action before this look failed, by the truth.
-        graph: Index, in the trial's graphs, of the ATG of the most probable hypothesis.
+        graph: Index, in the trial's graphs, of the ATG of what the robot would judge the object to be.
         frame: The camera frame as a ``data:`` address, if there is one.
     """
 

@@ -69,14 +69,14 @@ def told_verdict(verdict: str, matched: object) -> str:
 def with_graphs(
     page: TrialPage, looks: Sequence[Look], memory: RobotMemory | None, assumptions: Assumptions, matched: str | None
 ) -> TrialPage:
-    """Return the page with these looks, each pointing at the ATG of its most probable hypothesis.
+    """Return the page with these looks, each pointing at the ATG of what the robot would judge the object to be then.
 
-    Where a look does not say which objects are probable, it is the one that was matched at the end, or a new one.
+    That is a new object, or the most probable one; where a look does not say which, the one matched at the end.
     """
     actions = [look.action for look in looks if look.action is not None]
     graphs = TrialGraphs(memory, assumptions, [look.seen for look in looks], actions)
     pointing = []
     for look in looks:
-        best, share = look.objects[0] if look.objects else (matched, 0.5)
-        pointing.append(replace(look, graph=graphs.index_of(None if look.unseen > share else best)))
+        best = look.objects[0][0] if look.objects else matched
+        pointing.append(replace(look, graph=graphs.index_of(None if look.unseen > 0.5 else best)))
     return replace(page, looks=tuple(pointing), graphs=graphs.graphs)

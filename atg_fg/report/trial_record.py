@@ -71,7 +71,7 @@ def read_trial_record(text: str, path: Path, memory: RobotMemory | None) -> Repo
 
 _NO_MEMORY = (
     "The record does not hold the ATGs that the robot remembered, so the graph is of what the trial has shown. "
-    "With --memory FILE it is that of the most probable object."
+    "With --memory FILE it is that of the object it takes this one for."
 )
 
 
