@@ -161,9 +161,10 @@ def read_log(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
         InvalidInputError: The file cannot be read, or is not such a file.
     """
     lines, _ = _sound_lines(path)
-    if not lines or {name: lines[0].get(name) for name in _FORMAT} != _FORMAT:
+    header = lines[0] if lines and isinstance(lines[0], dict) else {}
+    if {name: header.get(name) for name in _FORMAT} != _FORMAT:
         raise InvalidInputError(f"{path}: is not a log of trials; expected a file that --records wrote")
-    return lines[0], lines[1:]
+    return header, lines[1:]
 
 
 def _member(line: Mapping[str, Any]) -> bytes:

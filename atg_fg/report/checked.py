@@ -72,6 +72,14 @@ def shown(truth: Any) -> tuple[int, ...] | None:
     return None
 
 
+def presented(truth: Any, place: str) -> int | str:
+    """Return which object a world's truth says was presented."""
+    found = field_of(truth, "object", place)
+    if not isinstance(found, (int, str)):
+        raise InvalidInputError(f"{place}: object: {found!r}; expected a number or a name")
+    return found
+
+
 def told_truth(truth: Any) -> str:
     """Return in words what was presented, by a world's truth."""
     if not isinstance(truth, Mapping) or "object" not in truth:

@@ -47,7 +47,7 @@ def read_report(path: Path, memory: RobotMemory | None = None) -> Report:
     if _first_line(text).get("format") == TRIAL_FORMAT:
         return read_trial_record(text, path, memory)
     document = parse_json(text, str(path))
-    if isinstance(document, dict) and document.get("command") in EXPERIMENTS:
+    if isinstance(document, dict) and document.get("command") in list(EXPERIMENTS):
         return read_experiment(document, str(path))
     raise InvalidInputError(f"{path}: {_what_it_says(document)}; {_EXPECTED}")
 

@@ -75,10 +75,12 @@ class _Test:
         verdict, matched = verdict_of(summary, place)
         if self.inferred:
             looks = self._with_beliefs(looks)
-        truth = summary["truth"][0]
-        page = TrialPage(f"trial {number}", verdict, self._told_truth(truth), None, (), ())
+        presented = checked.presented(summary["truth"][0], f"{place}: truth[0]")
+        met = "met before" if self.score.has_met(presented) else "never met before"
+        truth = f"{checked.told_truth(summary['truth'][-1])}, {met}"
+        page = TrialPage(f"trial {number}", verdict, truth, None, (), ())
         page = with_graphs(page, looks, self._memory if self.inferred else None, self._assumptions, matched)
-        return replace(page, right=self._learn(summary, looks, matched, place))
+        return replace(page, right=self._learn(summary, looks, matched, presented, place))
 
     def _with_beliefs(self, looks: list[Look]) -> list[Look]:
         """Return the looks with the belief over objects, if the memory leads to what was recorded."""
@@ -100,7 +102,9 @@ class _Test:
                 inference.act(self._assumptions.action_index(look.action))
         return found
 
-    def _learn(self, summary: Mapping[str, Any], looks: list[Look], matched: str | None, place: str) -> bool:
+    def _learn(
+        self, summary: Mapping[str, Any], looks: list[Look], matched: str | None, presented: int | str, place: str
+    ) -> bool:
         """Let the memory learn from a trial; return whether its verdict was right."""
         alphabet = self._assumptions.alphabet
         seen = [Evidence.of_detection(alphabet, look.seen).pattern for look in looks]
@@ -109,7 +113,7 @@ class _Test:
             matched=matched,
             patterns=tuple(summary.get("learned", seen)),
             actions=tuple(self._assumptions.action_index(look.action) for look in looks if look.action is not None),
-            object=checked.field_of(summary["truth"][0], "object", f"{place}: truth[0]"),
+            object=presented,
             detections=tuple(look.seen for look in looks),
         )
         before = self.score.successes
@@ -120,15 +124,13 @@ class _Test:
         self.score.add(outcome, learned)
         return self.score.successes > before
 
-    def _told_truth(self, truth: Any) -> str:
-        met = isinstance(truth, Mapping) and self.score.has_met(truth.get("object"))
-        return f"{checked.told_truth(truth)}, {'met before' if met else 'never met before'}"
-
 
 def _plan(header: Mapping[str, Any], path: Path) -> TestPlan:
     """Return what the header says of the test, as far as the beliefs depend on it."""
     try:
         parameters = ModelParameters(**header.get("parameters", {}))
+        if not isinstance(header.get("world", ""), str):
+            raise InvalidInputError(f"world: {header['world']!r}; expected a name")
         wanted = ("world", "world_options", "policy", "merge_duplicates", "n_objects")
         return TestPlan(parameters=parameters, **{key: header[key] for key in wanted if key in header})
     except (TypeError, ValueError, AtgError) as error:

@@ -1,12 +1,14 @@
 """What a page is told of each kind of file."""
 
+import contextlib
 import gzip
 import json
+import random
 from pathlib import Path
 
 import pytest
 
-from atg_fg.errors import InvalidInputError
+from atg_fg.errors import AtgError, InvalidInputError
 from atg_fg.report.experiments import EXPERIMENTS
 from atg_fg.report.reading import read_report
 from atg_fg.trial_log import read_log
@@ -212,3 +214,54 @@ def test_a_file_of_another_kind_is_refused(tmp_path, content, message):
 def test_a_file_that_is_not_there_is_refused(tmp_path):
     with pytest.raises(InvalidInputError, match="absent: cannot be read"):
         read_report(tmp_path / "absent")
+
+
+VALUES = (None, True, -1, 1.5, 10**30, "x", "", [], {}, [None], {"a": 1}, [1, 2, 3], -5.0)
+
+
+def places(value, path=()):
+    yield path
+    if isinstance(value, (dict, list)):
+        for key in list(value) if isinstance(value, dict) else range(min(len(value), 3)):
+            yield from places(value[key], (*path, key))
+
+
+def with_a_fault(document, rng):
+    """Return a document in which one value anywhere is another one, or is gone."""
+    broken = json.loads(json.dumps(document))
+    *way, last = rng.choice([path for path in places(broken) if path])
+    holder = broken
+    for key in way:
+        holder = holder[key]
+    if rng.random() < 0.25:
+        del holder[last]
+    else:
+        holder[last] = rng.choice(VALUES)
+    return broken
+
+
+@pytest.mark.parametrize("kind", ["record", "test_log", "goal_run", "table1_paper", "compare", "goal_learned"])
+def test_any_fault_in_any_file_is_one_error_or_none(kind, request, tmp_path):
+    rng = random.Random(kind)
+    if kind in ("record", "test_log", "goal_run"):
+        content = request.getfixturevalue(kind).read_bytes()
+        packed = content.startswith(b"\x1f\x8b")
+        text = gzip.decompress(content).decode() if packed else content.decode()
+        document = [json.loads(line) for line in text.splitlines()][:4]
+    else:
+        packed, document = False, [json.loads((RESULTS / f"{kind}.json").read_text())]
+    path = tmp_path / "broken"
+    for _ in range(60):
+        lines = [json.dumps(line).encode() + b"\n" for line in with_a_fault(document, rng)]
+        path.write_bytes(b"".join(map(gzip.compress, lines) if packed else lines))
+        with contextlib.suppress(AtgError):
+            read_report(path)
+
+
+@pytest.mark.parametrize("world", ["prism", "lid-box"])
+def test_tests_of_other_worlds_are_read_too(world, run, tmp_path):
+    quick = ["--engine", "bayes-filter", "--tests", "1", "--trials", "3", "--actions", "3", "--jobs", "1"]
+    assert run("table1", "--world", world, *quick, "--records", tmp_path)[0] == 0
+    report = read_report(tmp_path / "test-0000.jsonl.gz")
+    assert len(report.trials) == 3
+    assert all(look.objects or number == 0 for number, page in enumerate(report.trials) for look in page.looks)
