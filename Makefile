@@ -44,8 +44,11 @@ notebooks: $(READY)  ## Execute the notebooks, with the sources of their paired 
 docs: $(READY)  ## Build the documentation site in out/docs; a warning is an error
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs out/docs
 
-bench: $(READY)  ## Time one decision of every engine, and the simulated robot, side by side
-	$(BIN)/python benchmarks/decision.py
+# The other scripts in benchmarks/ are about success, not time, and are run by themselves: docs/performance.md.
+bench: $(READY)  ## Time engines and other libraries, and the simulated robot, side by side; fill in docs/performance.md
+	$(BIN)/python -m pip install --quiet --editable '.[bench]'
+	mkdir -p results
+	$(BIN)/atg-fg bench --json results/bench.json --markdown docs/performance.md
 	$(BIN)/python benchmarks/simulation.py
 
 # One command a file: README's results tables and figures are these.

@@ -1,1 +1,1 @@
-"""Measurements: ratios taken side by side in one run, never absolute times."""
+"""Measurements: ratios taken side by side in one run. ``benchmarks.cli`` is ``atg-fg bench``."""

@@ -25,7 +25,7 @@ from atg_fg.policies import make_policy
 from atg_fg.presets import preset
 from atg_fg.statistics import standard_error
 from atg_fg.worlds import detection_of, make_world
-from benchmarks.decision import remembered
+from benchmarks.memories import remembered
 
 POLICIES = ("entropy", "lookahead-2", "lookahead-3")
 N_OBJECTS = 100
@@ -55,7 +55,9 @@ def seconds(policy: str, inference: Inference) -> float:
 
 
 def costs() -> Table:
-    times = {(look, policy): [] for look, policy in product(range(N_LOOKS), POLICIES)}
+    times: dict[tuple[int, str], list[float]] = {
+        (look, policy): [] for look, policy in product(range(N_LOOKS), POLICIES)
+    }
     for look, inference in looks():
         for policy in POLICIES:
             times[look, policy].append(seconds(policy, inference))

@@ -71,9 +71,13 @@ app.command()(doctor.doctor)
 app.add_typer(memory.app, name="memory")
 app.add_typer(structure.app, name="structure")
 app.add_typer(uai.app, name="uai")
-# Packages beside this one, such as ``sim``, add groups of commands by an entry point.
-for group in entry_points(group="atg_fg.commands"):
-    app.add_typer(group.load(), name=group.name)
+# Packages beside this one add groups of commands (``sim``) and single commands (``bench``) by entry points.
+for entry in entry_points(group="atg_fg.commands"):
+    added = entry.load()
+    if isinstance(added, typer.Typer):
+        app.add_typer(added, name=entry.name)
+    else:
+        app.command(entry.name)(added)
 
 
 def main() -> None:
