@@ -23,11 +23,15 @@ N_LOGARITHMS: Final = 1 << 15
 
 
 def description() -> dict[str, Any]:
-    """Return processor, cores, Python, packages and limits on threads; nothing that names the machine itself."""
+    """Return processor, cores, their load, Python, packages and limits on threads; nothing that names the machine.
+
+    ``load`` is how many processes wanted to run in the last minute: where it exceeds the cores, times say little.
+    """
     cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     return {
         "processor": processor(),
         "cores": cores,
+        "load": round(os.getloadavg()[0], 1) if hasattr(os, "getloadavg") else None,
         "system": f"{platform.system()} {platform.machine()}",
         "python": platform.python_version(),
         "packages": {name: installed_version(name) for name in PACKAGES},

@@ -57,7 +57,7 @@ def run(
     Returns:
         A document as JSON knows it; ``docs/file_formats.md`` says what is in it.
     """
-    trials, floors = [], []
+    machine, trials, floors = description(), [], []
     on_part(f"{min(plan.sizes):,} objects")
     remaining = sorted(plan.sizes)[1:]
     for memory, measured in measure_all(list(plan.sizes), plan.trial, clock):
@@ -70,7 +70,7 @@ def run(
         "format": FORMAT,
         "version": 1,
         "parameters": asdict(plan),
-        "machine": description(),
+        "machine": machine,
         "trials": trials,
         "floor": floors,
         "equal_matches": equal,

@@ -66,6 +66,8 @@ def machine_line(document: dict[str, Any]) -> str:
     packages = ", ".join(f"{name} {version}" for name, version in machine["packages"].items() if version)
     threads = ", ".join(f"{name}={value}" for name, value in machine["threads"].items())
     limits = f"; {threads}" if threads else ""
+    if machine["load"] is not None:
+        limits += f"; load at the start {machine['load']:g}"
     return (
         f"{machine['processor']}, {machine['cores']} cores, {machine['system']}, Python {machine['python']}, "
         f"{packages}{limits}."

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+from functools import cache
 from importlib.metadata import entry_points
 from typing import Annotated
 
@@ -71,18 +72,26 @@ app.command()(doctor.doctor)
 app.add_typer(memory.app, name="memory")
 app.add_typer(structure.app, name="structure")
 app.add_typer(uai.app, name="uai")
-# Packages beside this one add groups of commands (``sim``) and single commands (``bench``) by entry points.
-for entry in entry_points(group="atg_fg.commands"):
-    added = entry.load()
-    if isinstance(added, typer.Typer):
-        app.add_typer(added, name=entry.name)
-    else:
-        app.command(entry.name)(added)
+
+
+@cache
+def add_commands_of_packages() -> None:
+    """Add what packages beside this one offer by entry points: groups of commands (``sim``), single ones (``bench``).
+
+    Not done when this package is imported: theirs import it, and could then not be imported by themselves.
+    """
+    for entry in entry_points(group="atg_fg.commands"):
+        added = entry.load()
+        if isinstance(added, typer.Typer):
+            app.add_typer(added, name=entry.name)
+        else:
+            app.command(entry.name)(added)
 
 
 def main() -> None:
     """Run the command line and leave with its exit status."""
     try:
+        add_commands_of_packages()
         status = app(standalone_mode=False)
     except (AtgError, typer.exceptions.TyperException) as error:
         sys.exit(_fail(error))

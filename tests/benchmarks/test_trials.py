@@ -59,7 +59,8 @@ def test_exact_engines_agree_and_a_library_that_is_missing_is_a_row(no_peers):
     assert "rounds" not in row(measured, "other", "paper")
 
 
-def test_what_would_take_too_long_is_left_out_with_the_reason_but_never_the_reference(no_peers):
+def test_what_would_take_too_long_is_left_out_with_the_reason_but_never_the_reference(no_peers, monkeypatch):
+    monkeypatch.setattr(trials, "GROWING", 2)
     sizes = Sizes(TrialPlan(n_actions=2, most_seconds=8), CountingClock())
     sizes.measure(remembered(2), 1)
     measured = sizes.measure(remembered(4), 1)
@@ -67,6 +68,12 @@ def test_what_would_take_too_long_is_left_out_with_the_reason_but_never_the_refe
     reason = "a trial would take 14 s, as it took 7 s at 2; the limit is 8 s"
     assert row(measured, "gtsam", "paper")["left_out"] == reason
     assert "rounds" in row(measured, REFERENCE, "paper")
+
+
+def test_nothing_is_concluded_from_a_small_memory(no_peers):
+    sizes = Sizes(TrialPlan(n_actions=2, most_seconds=8), CountingClock())
+    sizes.measure(remembered(2), 1)
+    assert "rounds" in row(sizes.measure(remembered(4), 1), "gtsam", "paper")
 
 
 def test_tables_that_are_too_large_are_left_out(monkeypatch):

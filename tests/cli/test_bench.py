@@ -1,5 +1,7 @@
 import json
 import platform
+import subprocess
+import sys
 
 import pytest
 
@@ -69,3 +71,9 @@ def test_what_cannot_be_is_refused_before_anything_is_measured(refused, folder, 
         assert said in refused("bench", "--from", other)
     other.write_text('{"format": "atg-fg/bench", "version": 1}')
     assert "not as atg-fg bench wrote it" in refused("bench", "--from", other)
+
+
+@pytest.mark.parametrize("module", ["sim.cli", "benchmarks.cli"])
+def test_what_adds_commands_can_be_imported_by_itself(module):
+    done = subprocess.run([sys.executable, "-c", f"import {module}"], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
