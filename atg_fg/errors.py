@@ -25,6 +25,10 @@ class TooLargeError(AtgError, ValueError):
     """A computation refused before it takes memory, because of its size."""
 
 
+class BusyMemoryError(AtgError, TimeoutError):
+    """A memory database that another process was writing to for longer than this one waited."""
+
+
 class MissingDependencyError(AtgError, ImportError):
     """An optional package that is not installed; the message names the extra that brings it."""
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from atg_fg.database.trial_log import DatabaseTrialLog, check_not_in_database
 from atg_fg.duplicates import Duplicate, merge_duplicates
 from atg_fg.engines import begin_trial, check_engine
 from atg_fg.engines.base import Inference
@@ -21,7 +22,7 @@ from atg_fg.parameters import ModelParameters
 from atg_fg.policies import make_policy
 from atg_fg.smoothed_learning import smoothed_patterns
 from atg_fg.statistics import mean, mean_interval, standard_error, wilson_interval
-from atg_fg.store import make_folder, save_memory
+from atg_fg.store import goes_to_database, make_folder, save_memory
 from atg_fg.structure.memory import memory_for
 from atg_fg.trial import TrialRecord, run_trial
 from atg_fg.trial_log import TrialLog, TrialOutcome, check_not_begun
@@ -116,10 +117,10 @@ def run_test(
     Args:
         plan: World, engine, policy and sizes.
         seed: Seed of the test.
-        records: Folder in which every trial is saved as it ends.
+        records: Folder, or database, in which every trial is saved as it ends.
         resume: Go on after the trials that are already there; the result is the same as of a test in one go.
         on_trial: Called with the number and the record of each trial that is run.
-        memories: Folder in which the memory is saved at the end.
+        memories: Folder in which the memory is saved at the end, or a database for the memory of one test.
 
     Raises:
         InvalidInputError: The records are of another test, or already there while ``resume`` is false.
@@ -146,7 +147,8 @@ def run_test(
                 on_trial(number, record)
             stop_if_asked()
     if memories is not None:
-        save_memory(memory, make_folder(memories) / f"memory-{seed:04}.json")
+        in_folder = not goes_to_database(memories)
+        save_memory(memory, make_folder(memories) / f"memory-{seed:04}.json" if in_folder else memories)
     return score.result(seed, merging=plan.merge_duplicates)
 
 
@@ -157,11 +159,26 @@ def _learn_and_score(outcome: TrialOutcome, memory: RobotMemory, plan: TestPlan,
         score.add_merges(merge_duplicates(memory, plan.parameters, learned))
 
 
-def _open_log(plan: TestPlan, seed: int, records: Path | None, memory: RobotMemory) -> TrialLog | None:
+def _open_log(
+    plan: TestPlan, seed: int, records: Path | None, memory: RobotMemory
+) -> TrialLog | DatabaseTrialLog | None:
     if records is None:
         return None
+    if goes_to_database(records):
+        return DatabaseTrialLog(records, _header(plan, seed), memory.assumptions)
     make_folder(records)
-    return TrialLog(_log_path(records, seed), {"seed": seed, **unusual(plan)}, memory.assumptions)
+    return TrialLog(_log_path(records, seed), _header(plan, seed), memory.assumptions)
+
+
+def _check_not_begun(plan: TestPlan, seed: int, records: Path) -> None:
+    if goes_to_database(records):
+        check_not_in_database(records, _header(plan, seed))
+    else:
+        check_not_begun(_log_path(records, seed))
+
+
+def _header(plan: TestPlan, seed: int) -> dict[str, Any]:
+    return {"seed": seed, **unusual(plan)}
 
 
 def _log_path(records: Path, seed: int) -> Path:
@@ -190,14 +207,17 @@ def _smoothed(inference: Inference, record: TrialRecord) -> list[int | None] | N
 
 
 def learn_from(record: TrialRecord | TrialOutcome, memory: RobotMemory) -> str | None:
-    """Let the memory learn from a trial; return the name of the ATG.
+    """Let the memory learn from a trial, in one transaction if it is kept in a file; return the name of the ATG.
 
     Nothing is learned, and ``None`` returned, if the object was lost or no pattern was seen whole.
     """
-    if record.verdict in ("lost", "undecided") or all(pattern is None for pattern in record.patterns):
-        return None
-    name = memory.learn(list(record.patterns), list(record.actions), record.matched)
-    memory.learn_shared(name, record.detections, record.actions)
+    with memory.transaction():
+        name = None
+        if record.verdict not in ("lost", "undecided") and any(pattern is not None for pattern in record.patterns):
+            name = memory.learn(list(record.patterns), list(record.actions), record.matched)
+            memory.learn_shared(name, record.detections, record.actions)
+        if isinstance(record, TrialRecord):
+            memory.add_record(record, name)
     return name
 
 
@@ -274,9 +294,9 @@ def run_tests(
         InvalidInputError: As for ``run_test`` and ``run_pieces``.
     """
     if records is not None:
-        records = make_folder(records).resolve()
-        for _, seed in plans if not resume else ():
-            check_not_begun(_log_path(records, seed))
+        records = records.resolve() if goes_to_database(records) else make_folder(records).resolve()
+        for plan, seed in plans if not resume else ():
+            _check_not_begun(plan, seed, records)
     # Always to be gone on with from here, for a worker that dies leaves part of a test to the next one.
     resolved = None if memories is None else memories.resolve()
     run = partial(_run_one_of, records=records, memories=resolved)

@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
 
 from atg_fg.assumptions import Assumptions
 from atg_fg.errors import InvalidInputError, unknown_name
 from atg_fg.graph import AspectTransitionGraph
 from atg_fg.merging import Merge, check_merges
 from atg_fg.patterns import Detection
+from atg_fg.persistence import Persistent, one_transaction
 
 
-class RobotMemory:
+class RobotMemory(Persistent):
     """ATGs by name, in the order they were made, under one set of assumptions.
 
     Args:
@@ -37,6 +39,36 @@ class RobotMemory:
         self._merges = list(merges)
         check_merges(self._merges, self._graphs, "merges")
 
+    @classmethod
+    def open(
+        cls,
+        path: Path | str,
+        assumptions: Assumptions | None = None,
+        *,
+        read_only: bool = False,
+        wait: float = 5.0,
+    ) -> RobotMemory:
+        """Open a memory in an SQLite file, and keep there what it learns: each trial is one transaction.
+
+        Use it as a context manager. ATGs are changed by the memory's methods alone; what is done to one of them in
+        place is not kept. Several processes may read while one writes, and writers wait for each other.
+
+        Args:
+            path: The file.
+            assumptions: Of a new memory, if the file holds none yet; not needed for one that is there.
+            read_only: Refuse all changes; nothing is written to the file.
+            wait: Seconds to wait for another process that is writing.
+
+        Raises:
+            BusyMemoryError: Another process was writing all that time.
+            InvalidInputError: There is no memory and no assumptions were given, the file is no memory database or is
+                damaged, it cannot be written, or it was made under other assumptions.
+        """
+        from atg_fg.database.keeper import open_memory  # it needs this module
+
+        return open_memory(path, assumptions, read_only=read_only, wait=wait)
+
+    @one_transaction
     def add(self, graph: AspectTransitionGraph) -> None:
         """Add the ATG of a novel object.
 
@@ -59,6 +91,7 @@ class RobotMemory:
         """U = max(|O| − K, 1), the number of objects never met."""
         return max(self.assumptions.n_objects - len(self), 1)
 
+    @one_transaction
     def learn(self, patterns: Sequence[int | None], actions: Sequence[int], matched: str | None) -> str:
         """Learn from a trial and return the name of the ATG it went to.
 
@@ -97,6 +130,7 @@ class RobotMemory:
         """Names of ATGs that were merged into others; they are kept free for undoing it."""
         return [merge.dropped.name for merge in self._merges]
 
+    @one_transaction
     def merge(self, keep: str, drop: str) -> Merge:
         """Make one ATG of two that were made from one object; return the record that ``unmerge`` goes by.
 
@@ -117,6 +151,7 @@ class RobotMemory:
         self._merges.append(merge)
         return merge
 
+    @one_transaction
     def unmerge(self, name: str) -> None:
         """Undo a merge: both ATGs are as they were; what was learned since stays with the one that was kept.
 
@@ -151,6 +186,10 @@ class RobotMemory:
 
     def _unmerge_shared(self, merge: Merge) -> None:
         """Let what all objects share know that a merge was undone."""
+
+    def become(self, other: RobotMemory) -> None:
+        """Have the ATGs and merges of another memory, under the same assumptions, instead of one's own."""
+        self._graphs, self._merges = dict(other._graphs), list(other._merges)
 
     def copy(self) -> RobotMemory:
         """Return a memory that can learn without touching this one."""

@@ -2,33 +2,34 @@
 
 from __future__ import annotations
 
-import json
 import os
 import tempfile
 from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
-from atg_fg.assumptions import Assumptions
+from atg_fg.database.connection import is_database
+from atg_fg.database.memory_reading import load_database
+from atg_fg.database.saving import save_database
 from atg_fg.errors import InvalidInputError
-from atg_fg.json_format import (
-    check_format,
-    parse_json,
-    placed,
-    read_assumptions,
-    read_graph,
-    read_integer,
-    read_list,
-    read_memory,
-    read_object,
-    write_assumptions,
-    write_graph,
-)
 from atg_fg.memory import RobotMemory
-from atg_fg.merging import Merge
-from atg_fg.structure.json_section import read_learner, write_learner
-from atg_fg.structure.memory import StructuredMemory
+from atg_fg.memory_json import MEMORY_FORMAT, memory_from_json, memory_to_json
 
-MEMORY_FORMAT: Final = "atg-fg/memory"
+__all__ = [
+    "DATABASE_SUFFIXES",
+    "MEMORY_FORMAT",
+    "check_writable",
+    "goes_to_database",
+    "load_memory",
+    "make_folder",
+    "memory_from_json",
+    "memory_to_json",
+    "read_text_file",
+    "save_memory",
+    "write_bytes_atomically",
+]
+
+#: Names of new files that become databases.
+DATABASE_SUFFIXES: Final = (".db", ".sqlite", ".sqlite3")
 
 
 def read_text_file(path: Path | str) -> str:
@@ -104,69 +105,34 @@ def _cannot_write(path: Path | str, error: Exception) -> InvalidInputError:
 
 
 def save_memory(memory: RobotMemory, path: Path | str) -> None:
-    """Save a robot memory, with the structure it has learned, as versioned JSON, atomically."""
-    write_bytes_atomically(path, memory_to_json(memory).encode())
+    """Save a robot memory, with the structure it has learned; the file holds the old one or the new, never a part.
+
+    A database that is there stays one, and its records of trials stay; a new file is a database if its name ends in
+    one of ``DATABASE_SUFFIXES``, else versioned JSON.
+
+    Raises:
+        InvalidInputError: The file cannot be written; what was there is as it was.
+    """
+    if goes_to_database(path):
+        save_database(memory, path)
+    else:
+        write_bytes_atomically(path, memory_to_json(memory).encode())
 
 
 def load_memory(path: Path | str) -> RobotMemory:
-    """Load a robot memory.
+    """Load a robot memory from JSON or a database, whichever the file is by its content.
 
     Raises:
-        InvalidInputError: Unreadable, not JSON, or anything in it is not as it should be; the message names the place.
+        InvalidInputError: Unreadable, or anything in it is not as it should be; the message names the place.
     """
+    if is_database(path):
+        return load_database(path)
     return memory_from_json(read_text_file(path), str(path))
 
 
-def memory_to_json(memory: RobotMemory) -> str:
-    """Return a robot memory as a JSON document."""
-    document: dict[str, Any] = {
-        "format": MEMORY_FORMAT,
-        "version": 1,
-        "assumptions": write_assumptions(memory.assumptions),
-        "memory": [write_graph(graph) for graph in memory],
-    }
-    if memory.merges:
-        document["merges"] = [_write_merge(merge) for merge in memory.merges]
-    if isinstance(memory, StructuredMemory):
-        document["structure"] = write_learner(memory.learner)
-    return json.dumps(document, indent=1) + "\n"
-
-
-def memory_from_json(text: str, place: str = "memory") -> RobotMemory:
-    """Return the robot memory in a JSON document; errors name ``place``."""
-    keys = ("format", "version", "assumptions", "memory")
-    document = read_object(parse_json(text, place), place, keys, optional=("merges", "structure"))
-    check_format(document, MEMORY_FORMAT, place)
-    assumptions = read_assumptions(document["assumptions"], f"{place}: assumptions")
-    memory = read_memory(document["memory"], assumptions, f"{place}: memory")
-    entries = read_list(document.get("merges", []), f"{place}: merges")
-    merges = [_read_merge(entry, assumptions, f"{place}: merges[{index}]") for index, entry in enumerate(entries)]
-    learner = None
-    if "structure" in document:
-        learner = read_learner(document["structure"], assumptions, memory.names, f"{place}: structure")
-    with placed(place):
-        if learner is None:
-            return RobotMemory(assumptions, memory, merges)
-        return StructuredMemory(assumptions, memory, learner, merges)
-
-
-def _write_merge(merge: Merge) -> dict[str, Any]:
-    """Return a merge as JSON knows it."""
-    return {
-        "kept": write_graph(merge.kept),
-        "dropped": write_graph(merge.dropped),
-        "position": merge.position,
-        "trials": list(merge.trials),
-    }
-
-
-def _read_merge(value: Any, assumptions: Assumptions, place: str) -> Merge:
-    """Return the merge at ``place``."""
-    fields = read_object(value, place, ("kept", "dropped", "position", "trials"))
-    trials = read_list(fields["trials"], f"{place}.trials")
-    return Merge(
-        read_graph(fields["kept"], assumptions, f"{place}.kept"),
-        read_graph(fields["dropped"], assumptions, f"{place}.dropped"),
-        read_integer(fields["position"], f"{place}.position", least=0),
-        tuple(read_integer(number, f"{place}.trials[{index}]", least=0) for index, number in enumerate(trials)),
-    )
+def goes_to_database(path: Path | str) -> bool:
+    """Return whether a memory is saved to ``path`` as a database: by what is there, or else by the name."""
+    there = Path(path)
+    if there.is_dir() or (there.exists() and there.stat().st_size > 0):
+        return is_database(path)
+    return there.suffix in DATABASE_SUFFIXES

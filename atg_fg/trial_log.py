@@ -98,7 +98,7 @@ class TrialLog:
         with self.path.open("r+b") as file:
             file.truncate(sound)
         self._end = sound
-        return [self._outcome(line) for line in lines[1:]]
+        return [outcome_of(line, self._assumptions, str(self.path)) for line in lines[1:]]
 
     def append(self, record: TrialRecord, outcome: TrialOutcome | None = None) -> None:
         """Add a trial to the file, and what is learned from it if that is not what was seen."""
@@ -111,20 +111,26 @@ class TrialLog:
             file.write(content)
         self._end += len(content)
 
-    def _outcome(self, line: dict[str, Any]) -> TrialOutcome:
-        alphabet, names = self._assumptions.alphabet, self._assumptions.actions
-        try:
-            seen: list[Detection] = [tuple(detection) for detection in line["observed"]]
-            return TrialOutcome(
-                line["verdict"],
-                line["matched"],
-                tuple(line.get("learned", [Evidence.of_detection(alphabet, each).pattern for each in seen])),
-                tuple(names.index(action) for action in line["actions"]),
-                line["truth"][0]["object"],
-                tuple(seen),
-            )
-        except (KeyError, IndexError, TypeError, ValueError) as error:
-            raise InvalidInputError(f"{self.path}: {error!r}; expected a trial a line") from error
+
+def outcome_of(line: Mapping[str, Any], assumptions: Assumptions, place: str) -> TrialOutcome:
+    """Return what scoring and learning need of a trial in a log.
+
+    Raises:
+        InvalidInputError: It is no such trial; the message names ``place``.
+    """
+    alphabet, names = assumptions.alphabet, assumptions.actions
+    try:
+        seen: list[Detection] = [tuple(detection) for detection in line["observed"]]
+        return TrialOutcome(
+            line["verdict"],
+            line["matched"],
+            tuple(line.get("learned", [Evidence.of_detection(alphabet, each).pattern for each in seen])),
+            tuple(names.index(action) for action in line["actions"]),
+            line["truth"][0]["object"],
+            tuple(seen),
+        )
+    except (KeyError, IndexError, TypeError, ValueError) as error:
+        raise InvalidInputError(f"{place}: {error!r}; expected a trial a line") from error
 
 
 def check_not_begun(path: Path) -> None:
@@ -155,7 +161,7 @@ def read_trials(path: Path) -> list[dict[str, Any]]:
 
 
 def read_log(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """Return the header of a file and its trials as they were logged; half a trial at the end is left out.
+    """Return the header of a file, without format and version, and its trials; half a trial at the end is left out.
 
     Raises:
         InvalidInputError: The file cannot be read, or is not such a file.
@@ -164,7 +170,7 @@ def read_log(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
     header = lines[0] if lines and isinstance(lines[0], dict) else {}
     if {name: header.get(name) for name in _FORMAT} != _FORMAT:
         raise InvalidInputError(f"{path}: is not a log of trials; expected a file that --records wrote")
-    return header, lines[1:]
+    return {name: value for name, value in header.items() if name not in _FORMAT}, lines[1:]
 
 
 def _member(line: Mapping[str, Any]) -> bytes:

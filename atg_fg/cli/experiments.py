@@ -43,7 +43,9 @@ def table1(
     world_option: options.WorldOption = None,
     jobs: options.Jobs = None,
     executor: options.Executor = "process",
-    records: Annotated[Path | None, typer.Option(help="Folder in which every trial is saved as it ends.")] = None,
+    records: Annotated[
+        Path | None, typer.Option(help="Folder, or database (.db), in which every trial is saved as it ends.")
+    ] = None,
     smoothed_learning: Annotated[
         bool, typer.Option("--smoothed-learning", help="Learn what is probable given all evidence of a trial.")
     ] = False,
@@ -51,7 +53,10 @@ def table1(
         bool, typer.Option("--merge-duplicates", help="After each trial, merge ATGs that are probably of one object.")
     ] = False,
     save_memories: Annotated[
-        Path | None, typer.Option(help="Folder in which the memory of each test is saved at its end.")
+        Path | None,
+        typer.Option(
+            help="Folder in which the memory of each test is saved at its end; a database (.db) for one test."
+        ),
     ] = None,
     resume: Annotated[bool, typer.Option("--resume", help="Go on after the trials that --records holds.")] = False,
     json_file: options.JsonFile = None,
@@ -67,7 +72,13 @@ def table1(
     options.check_json_option(json_file)
     if resume and records is None:
         raise InvalidInputError("--resume: no records to go on from; expected --records with their folder")
-    if save_memories is not None:
+    if save_memories is not None and store.goes_to_database(save_memories):
+        store.check_writable(save_memories)
+        if tests > 1:
+            raise InvalidInputError(
+                f"--save-memories: {save_memories} takes one memory; expected --tests 1 or a folder"
+            )
+    elif save_memories is not None:
         store.make_folder(save_memories)
     world_options = options.world_options(slip, wrong, missing, condition, urdf, world_option)
     model = preset_named(preset)

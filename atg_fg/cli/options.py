@@ -30,6 +30,7 @@ def available_cpus() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+MemoryFile = Annotated[Path, typer.Argument(help="A memory: JSON, or a database.", show_default=False)]
 World = Annotated[str, typer.Option(help=f"World: {', '.join(WORLDS)}, or module:namespace/Id-v0 of your own.")]
 ARcubeWorld = Annotated[
     str, typer.Option(help=f"World of ARcubes: {', '.join(ARCUBE_WORLDS)}, or module:namespace/Id-v0 of your own.")

@@ -22,8 +22,6 @@ from atg_fg.structure.words import action_text, register_names
 
 app = typer.Typer(no_args_is_help=True)
 
-MemoryFile = Annotated[Path, typer.Argument(help="A memory file (JSON).", show_default=False)]
-
 
 # Without it typer would make the only command of the group the group itself.
 @app.callback()
@@ -36,7 +34,7 @@ def group() -> None:
 
 @app.command()
 def show(
-    file: MemoryFile,
+    file: options.MemoryFile,
     name: Annotated[str | None, typer.Option("--object", help="Show what is predicted of this object.")] = None,
     plot: Annotated[
         Path | None,

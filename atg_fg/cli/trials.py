@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sys
-from contextlib import closing
+from contextlib import ExitStack, closing
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -16,6 +16,10 @@ from atg_fg import store
 from atg_fg.assumptions import arcube_assumptions
 from atg_fg.cli import options
 from atg_fg.cli.story import Story
+from atg_fg.database.connection import is_database
+from atg_fg.database.keeper import software_version
+from atg_fg.database.saving import save_database
+from atg_fg.database.stored import Experiment, StoredTrial
 from atg_fg.engines import begin_trial
 from atg_fg.errors import InvalidInputError
 from atg_fg.experiments import learn_from
@@ -42,7 +46,7 @@ def trial(
     actions: options.Actions = 10,
     settled: options.Settled = None,
     memory: Annotated[
-        Path | None, typer.Option(help="Memory file (JSON, or .npz) to start from; empty if not given.")
+        Path | None, typer.Option(help="Memory file (JSON, .db or .npz) to start from; empty if not given.")
     ] = None,
     save_memory: Annotated[
         Path | None, typer.Option(help="Save the memory with what was learned to this file.")
@@ -62,7 +66,9 @@ def trial(
 ) -> None:
     """Run one recognition trial, tell it step by step, and learn from it.
 
-    Example: atg-fg trial --memory memory.json --save-memory memory.json --seed 3
+    A database that is saved to itself learns in place: the trial, its record and what is learned are one transaction.
+
+    Example: atg-fg trial --memory robot.db --save-memory robot.db --seed 3
     """
     options.check_at_least(1, actions=actions)
     options.check_at_least(0, seed=seed, cubes_seed=cubes_seed)
@@ -76,11 +82,17 @@ def trial(
     chosen_policy = make_policy(policy, settled)
     parameters = preset_named(preset)
     engine = options.engine_of(engine, parameters, "gtsam")
-    loaded = load_any_memory(memory) if memory else None
     world_options = options.world_options(slip, wrong, missing, condition, urdf)
-    with closing(make_world_with(world, N_OBJECTS, cubes_seed, **world_options)) as made_world:
+    header: dict[str, Any] = {"engine": engine, "policy": policy, "preset": preset, "world": world, "seed": seed}
+    if settled is not None:
+        header["settled"] = settled
+    with ExitStack() as stack:
+        kept = _opened(memory, save_memory)
+        if kept is not None:
+            stack.callback(kept.close)
+        made_world = stack.enter_context(closing(make_world_with(world, N_OBJECTS, cubes_seed, **world_options)))
         empty = RobotMemory(assumptions_of(made_world, N_OBJECTS))
-        remembered = memory_for(parameters, empty if loaded is None else loaded)
+        remembered = stack.enter_context(memory_for(parameters, empty if kept is None else kept))
         inference = begin_trial(engine, remembered, parameters)
         story = Story(options.console(json_file), remembered)
         rng = np.random.default_rng(np.random.SeedSequence(seed))
@@ -92,16 +104,20 @@ def trial(
                 camera.take()
 
         result = run_trial(made_world, inference, chosen_policy, actions, rng, on_step=on_step)
-    story.verdict(result)
-    learned = learn_from(result, remembered)
-    header: dict[str, Any] = {"engine": engine, "policy": policy, "preset": preset, "world": world, "seed": seed}
-    if settled is not None:
-        header["settled"] = settled
-    lines = result.to_json_lines(camera.names if camera is not None else (), **header)
-    if record is not None:
-        store.write_bytes_atomically(record, lines.encode())
-    if save_memory is not None:
-        save_any_memory(remembered, save_memory)
+        story.verdict(result)
+        lines = result.to_json_lines(camera.names if camera is not None else (), **header)
+        if record is not None:
+            store.write_bytes_atomically(record, lines.encode())
+        about = {**header, "actions": actions, "cubes_seed": cubes_seed, "world_options": world_options}
+        del about["seed"]
+        remembered.begin_experiment("trial", about, seed)
+        learned = learn_from(result, remembered)
+        if save_memory is not None and not remembered.is_kept:
+            if store.goes_to_database(save_memory):
+                experiment = Experiment("trial", about, seed, software_version())
+                save_database(remembered, save_memory, (StoredTrial.of(result, learned),), experiment)
+            else:
+                save_any_memory(remembered, save_memory)
     steps = [json.loads(line) for line in lines.splitlines()[1:-1]]
     document = {
         "command": "trial",
@@ -113,6 +129,15 @@ def trial(
         "learned": learned,
     }
     options.write_json(document, json_file)
+
+
+def _opened(memory: Path | None, save_memory: Path | None) -> RobotMemory | None:
+    """Return the memory to start from; it keeps what it learns if it is saved to the database that it comes from."""
+    if memory is None:
+        return None
+    if save_memory is not None and is_database(memory) and save_memory.exists() and memory.samefile(save_memory):
+        return RobotMemory.open(memory)
+    return load_any_memory(memory)
 
 
 def replay(

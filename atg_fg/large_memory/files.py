@@ -44,22 +44,27 @@ _UNSOUND: Final = (
     zipfile.BadZipFile,
     zlib.error,
 )
-#: How files of arrays are told from those in JSON.
+#: How files of arrays are told from others.
 SUFFIX: Final = ".npz"
 
 
+def is_compact(path: Path | str) -> bool:
+    """Return whether a memory is a file of arrays, by its name."""
+    return Path(path).suffix == SUFFIX
+
+
 def load_any_memory(path: Path | str) -> RobotMemory:
-    """Load a robot memory from a file of arrays if its name ends in ``.npz``, else from JSON.
+    """Load a robot memory from a file of arrays if its name ends in ``.npz``, else from JSON or a database.
 
     Raises:
         InvalidInputError: Unreadable, or anything in it is not as it should be; the message names the place.
     """
-    return load_compact_memory(path) if Path(path).suffix == SUFFIX else load_memory(path)
+    return load_compact_memory(path) if is_compact(path) else load_memory(path)
 
 
 def save_any_memory(memory: RobotMemory, path: Path | str) -> None:
-    """Save the ATGs of a robot memory as arrays if the file's name ends in ``.npz``, else the memory as JSON."""
-    if Path(path).suffix == SUFFIX:
+    """Save the ATGs of a robot memory as arrays if the file's name ends in ``.npz``, else all as ``save_memory``."""
+    if is_compact(path):
         save_compact_memory(CompactMemory.of(memory), path)
     else:
         save_memory(memory, path)

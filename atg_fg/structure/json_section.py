@@ -17,8 +17,8 @@ from atg_fg.structure.shared_structure import read_structure, write_structure
 from atg_fg.structure.trials import RawTrial
 
 
-def write_learner(learner: StructureLearner) -> dict[str, Any]:
-    """Return a learner as JSON knows it."""
+def write_learner(learner: StructureLearner, first: int = 0) -> dict[str, Any]:
+    """Return a learner as JSON knows it, with its raw trials from number ``first`` on."""
     names = learner.assumptions.actions
     return {
         "seed": learner.seed,
@@ -31,7 +31,7 @@ def write_learner(learner: StructureLearner) -> dict[str, Any]:
                 "observed": [list(detection) for detection in trial.detections],
                 "actions": [names[action] for action in trial.actions],
             }
-            for owner, trial in zip(learner.owners, learner.trials, strict=True)
+            for owner, trial in zip(learner.owners[first:], learner.trials[first:], strict=True)
         ],
     }
 

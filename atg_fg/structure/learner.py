@@ -123,6 +123,12 @@ class StructureLearner:
         if self.trials:
             self._candidates = [self._scored(structure) for structure in structures]
 
+    def settle(self) -> None:
+        """Keep the best of the structures at hand, best first, and estimate the rates: trials were put together."""
+        self._candidates = self._worth_keeping()
+        self._estimate_rates()
+        self._candidates = self._worth_keeping()
+
     def hand_over(self, numbers: Sequence[int], owner: str) -> None:
         """Take raw trials for those of another object, and learn the contents of all objects anew.
 

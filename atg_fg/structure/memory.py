@@ -12,6 +12,7 @@ from atg_fg.memory import RobotMemory
 from atg_fg.merging import Merge
 from atg_fg.parameters import ModelParameters
 from atg_fg.patterns import Detection
+from atg_fg.persistence import one_transaction
 from atg_fg.structure.learner import StructureLearner
 from atg_fg.structure.trials import RawTrial
 
@@ -48,6 +49,7 @@ class StructuredMemory(RobotMemory):
                 if not 0 <= trial < n_trials:
                     raise InvalidInputError(f"merges[{number}].trials: {trial}; expected less than {n_trials}")
 
+    @one_transaction
     def learn_shared(self, name: str, detections: Sequence[Detection], actions: Sequence[int]) -> None:
         """Keep a raw trial, and learn from it what all objects share.
 
@@ -72,6 +74,12 @@ class StructuredMemory(RobotMemory):
     def _unmerge_shared(self, merge: Merge) -> None:
         self.learner.hand_over(merge.trials, merge.dropped.name)
 
+    def become(self, other: RobotMemory) -> None:
+        """Have what another memory has, under the same assumptions; if that has no structure, none is learned yet."""
+        super().become(other)
+        known = other.learner if isinstance(other, StructuredMemory) else None
+        self.learner = known or StructureLearner(self.assumptions)
+
     def copy(self) -> StructuredMemory:
         """Return a memory that can learn without touching this one."""
         graphs = (graph.copy() for graph in self)
@@ -93,7 +101,12 @@ class StructuredMemory(RobotMemory):
 
 
 def memory_for(parameters: ModelParameters, memory: RobotMemory) -> RobotMemory:
-    """Return a memory with the ATGs of ``memory`` that learns what the parameters say is to be learned."""
+    """Return a memory with the ATGs of ``memory`` that learns what the parameters say is to be learned.
+
+    If ``memory`` is kept in a file, it is the new one that is kept there from here on.
+    """
     if parameters.learn_structure and not isinstance(memory, StructuredMemory):
-        return StructuredMemory(memory.assumptions, memory, merges=memory.merges)
+        structured = StructuredMemory(memory.assumptions, memory, merges=memory.merges)
+        structured._keeper, memory._keeper = memory._keeper, None
+        return structured
     return memory

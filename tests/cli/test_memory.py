@@ -31,11 +31,15 @@ def test_check_says_that_a_memory_is_sound(run, file):
     assert json.loads(run("memory", "check", file, "--json", "-")[1])["sound"] is True
 
 
-def test_check_names_the_first_fault(refused, file):
+def test_check_leaves_with_status_1_if_there_is_a_fault_and_2_if_it_is_no_memory(run, refused, file, tmp_path):
     file.write_text(file.read_text().replace('"count": 1', '"count": -1', 1))
-    assert "memory[0].transitions[0].count: -1; expected a whole number of at least 1" in refused(
-        "memory", "check", file
-    )
+    status, output, _ = run("memory", "check", file)
+    assert (status, output.count("\n")) == (1, 1)
+    assert "memory[0].transitions[0].count: -1; expected a whole number of at least 1" in output
+    assert json.loads(run("memory", "check", file, "--json", "-")[1])["sound"] is False
+    assert "cannot be read" in refused("memory", "check", tmp_path / "absent.json")
+    file.write_text("{}")
+    assert "is no memory file" in refused("memory", "check", file)
 
 
 def test_export_writes_graphml_that_networkx_reads(run, file, tmp_path):

@@ -1,0 +1,39 @@
+"""``atg-fg memory compact``: ATGs as arrays, for memories of 100,000 of them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from atg_fg import store
+from atg_fg.cli import options
+from atg_fg.errors import InvalidInputError
+from atg_fg.large_memory.compact_memory import CompactMemory
+from atg_fg.large_memory.files import SUFFIX, is_compact, save_compact_memory
+from atg_fg.structure.memory import StructuredMemory
+
+
+def compact(
+    file: options.MemoryFile,
+    output: Annotated[Path, typer.Option(help="File of arrays to write, .npz.", show_default=False)],
+    json_file: options.JsonFile = None,
+) -> None:
+    """Write the ATGs of a memory as arrays, which load a hundred times as fast; for the engine large-memory.
+
+    Example: atg-fg memory compact memory.json --output memory.npz
+    """
+    options.check_json_option(json_file)
+    if not is_compact(output):
+        raise InvalidInputError(f"--output: {str(output)!r}; expected a name that ends in {SUFFIX}")
+    store.check_writable(output)
+    memory = store.load_memory(file)
+    if memory.merges or isinstance(memory, StructuredMemory):
+        raise InvalidInputError(f"{file}: merges or a learned structure; expected ATGs alone, as arrays keep no more")
+    made = CompactMemory.of(memory)
+    save_compact_memory(made, output)
+    document = {"command": "memory compact", "objects": len(made), "bytes": made.nbytes}
+    options.write_json(document, json_file)
+    if json_file != "-":
+        typer.echo(f"{output}: {len(made)} ATGs, {made.nbytes} bytes in memory")

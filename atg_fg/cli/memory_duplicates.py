@@ -1,0 +1,83 @@
+"""``atg-fg memory duplicates`` and ``unmerge``: ATGs of one object are merged, and taken apart again."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from atg_fg import store
+from atg_fg.cli import options
+from atg_fg.database.connection import is_database
+from atg_fg.duplicates import find_duplicates
+from atg_fg.memory import RobotMemory
+from atg_fg.presets import preset as preset_named
+from atg_fg.structure.memory import StructuredMemory
+
+
+def duplicates(
+    file: options.MemoryFile,
+    merge: Annotated[
+        bool, typer.Option("--merge", help="Merge them, the most probable pair first, and save the memory.")
+    ] = False,
+    threshold: Annotated[
+        float | None, typer.Option(help="Log odds, in nats, above which two ATGs are taken for one object.")
+    ] = None,
+    preset: Annotated[
+        str | None, typer.Option(help="Model parameters; learned if the memory has structure, else default.")
+    ] = None,
+    json_file: options.JsonFile = None,
+) -> None:
+    """Find ATGs that are probably of one object, as a false novelty leaves them, and merge them.
+
+    Example: atg-fg memory duplicates memory.json --merge
+    """
+    options.check_json_option(json_file)
+    with _changed(file) if merge else nullcontext(store.load_memory(file)) as memory:
+        usual = "learned" if isinstance(memory, StructuredMemory) else "default"
+        parameters = preset_named(preset or usual)
+        pairs = found = find_duplicates(memory, parameters, threshold)
+        if merge:
+            pairs = []
+            while found:  # anew after each: what was merged says more of the others
+                memory.merge(found[0].keep, found[0].drop)
+                pairs.append(found[0])
+                found = find_duplicates(memory, parameters, threshold)
+    document = {"command": "memory duplicates", "merged": merge, "pairs": [asdict(pair) for pair in pairs]}
+    options.write_json(document, json_file)
+    if json_file != "-":
+        did = "merged" if merge else "probably of one object"
+        typer.echo(f"{file}: {len(pairs)} pairs of {len(memory) + len(pairs) * merge} ATGs {did}")
+        for pair in pairs:
+            typer.echo(f"{pair.keep} and {pair.drop}: log odds {pair.log_odds:.1f}")
+
+
+def unmerge(
+    file: options.MemoryFile, name: Annotated[str, typer.Argument(help="The ATG that was merged into another one.")]
+) -> None:
+    """Undo a merge; what was learned since stays with the ATG that was kept.
+
+    Example: atg-fg memory unmerge memory.json object-007
+    """
+    with _changed(file) as memory:
+        memory.unmerge(name)
+    typer.echo(f"{file}: {name} is an ATG of its own again")
+
+
+@contextmanager
+def _changed(file: Path) -> Iterator[RobotMemory]:
+    """Give a memory, and write to its file what was changed, all of it or nothing."""
+    if is_database(file):
+        with RobotMemory.open(file) as memory, memory.transaction():
+            yield memory
+        return
+    store.check_writable(file)
+    memory = store.load_memory(file)
+    before = memory.merges
+    yield memory
+    if memory.merges != before:
+        store.save_memory(memory, file)

@@ -1,0 +1,225 @@
+"""``atg-fg memory export``, ``import``, ``merge`` and ``diff``: memories from file to file."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated, Any, Final
+
+import typer
+
+from atg_fg import store
+from atg_fg.cli import options
+from atg_fg.database.connection import is_database, open_to_write, translated, written
+from atg_fg.database.copying import add_records, records_in, records_in_log
+from atg_fg.database.memory_reading import database_holds_memory, holds_memory, read_memory_rows
+from atg_fg.database.memory_writing import replace_memory
+from atg_fg.database.stored import Experiment, StoredTrial
+from atg_fg.database.trial_log import read_stored_trials
+from atg_fg.errors import InvalidInputError
+from atg_fg.export import view_to_dot, view_to_graphml
+from atg_fg.large_memory.files import load_any_memory
+from atg_fg.memory import RobotMemory
+from atg_fg.memory_difference import difference
+from atg_fg.memory_union import unite
+from atg_fg.structure.completion import completed_atg
+from atg_fg.structure.memory import StructuredMemory
+
+GRAPH_FORMATS: Final = {"graphml": view_to_graphml, "dot": view_to_dot}
+EXPORTS: Final = (*GRAPH_FORMATS, "json", "trials")
+_GZIP: Final = b"\x1f\x8b"
+
+
+def export(
+    file: options.MemoryFile,
+    name: Annotated[str | None, typer.Option(help="The ATG to export; the first one if not given.")] = None,
+    format_name: Annotated[
+        str,
+        typer.Option("--format", help=f"One of: {', '.join(EXPORTS)}; the last two are of the whole memory."),
+    ] = "graphml",
+    completed: Annotated[
+        bool, typer.Option("--completed", help="Add the aspects and transitions that the learned structure predicts.")
+    ] = False,
+    output: Annotated[Path | None, typer.Option(help="File to write; standard output if not given.")] = None,
+) -> None:
+    """Export one ATG as GraphML or DOT, the whole memory as JSON, or its trials, a line of JSON each.
+
+    Example: atg-fg memory export memory.json --name object-003 --format dot --output atg.dot
+    """
+    if format_name not in EXPORTS:
+        raise InvalidInputError(f"--format: {format_name!r}; expected one of: {', '.join(EXPORTS)}")
+    if format_name in GRAPH_FORMATS:
+        text = _graph_text(file, name, format_name, completed=completed)
+    elif name is not None or completed:
+        raise InvalidInputError(f"--format {format_name} is of the whole memory; expected no --name or --completed")
+    elif format_name == "json":
+        text = store.memory_to_json(load_any_memory(file))
+    else:
+        text = _trials_text(file)
+    if output is None:
+        typer.echo(text, nl=False)
+    else:
+        store.write_bytes_atomically(output, text.encode())
+
+
+def _graph_text(file: Path, name: str | None, format_name: str, *, completed: bool) -> str:
+    memory = load_any_memory(file)
+    if not len(memory):
+        raise InvalidInputError(f"{file}: the memory is empty; expected at least one ATG to export")
+    graph = memory[name if name is not None else memory.names[0]]
+    if not completed:
+        view = graph.to_networkx()
+    elif isinstance(memory, StructuredMemory):
+        view = completed_atg(memory, graph.name)
+    else:
+        raise InvalidInputError(
+            f"--completed: {file} has no learned structure; expected a memory of the preset learned"
+        )
+    return GRAPH_FORMATS[format_name](view, memory.assumptions.alphabet.slots)
+
+
+def _trials_text(file: Path) -> str:
+    if not is_database(file):
+        raise InvalidInputError(f"--format trials: {file} is no database; expected one, since JSON holds no trials")
+    lines = (
+        {"experiment": trial.experiment, "number": trial.number, "learned": trial.learned, "trial": trial.line()}
+        for trial in read_stored_trials(file)
+    )
+    return "".join(json.dumps(line, allow_nan=False) + "\n" for line in lines)
+
+
+def import_files(
+    files: Annotated[
+        list[Path],
+        typer.Argument(help="Memories (JSON or databases), and logs of trials (.jsonl.gz).", show_default=False),
+    ],
+    into: Annotated[Path, typer.Option(help="The database; made if it is not there.", show_default=False)],
+) -> None:
+    """Put a memory, and records of trials, into a database: all of them, or nothing.
+
+    A database has one memory: if it has objects already, or two files have some, use `memory merge`.
+
+    Example: atg-fg memory import memory.json records/test-0000.jsonl.gz --into robot.db
+    """
+    logs = [file for file in files if _is_log(file)]
+    records: list[list[tuple[Experiment | None, list[StoredTrial]]]] = [[records_in_log(file)] for file in logs]
+    records += [list(records_in(file)) for file in files if is_database(file)]
+    memories = [store.load_memory(file) for file in files if file not in logs and _has_memory(file)]
+    full = [memory for memory in memories if len(memory)] or memories[:1]
+    with translated(into):
+        connection = open_to_write(into, create=True)
+        try:
+            with written(connection):
+                there = read_memory_rows(connection, str(into)) if holds_memory(connection) else None
+                if len(full) + (there is not None and len(there) > 0) > 1:
+                    raise InvalidInputError(f"{into}: more than one memory; expected one, or atg-fg memory merge first")
+                for memory in full:
+                    replace_memory(connection, memory)
+                added = [add_records(connection, each) for each in records]
+        finally:
+            connection.close()
+    n_objects = sum(map(len, full))
+    n_experiments, n_trials = (sum(counts[kind] for counts in added) for kind in (0, 1))
+    typer.echo(f"{into}: {n_objects} ATGs, {n_experiments} experiments and {n_trials} trials imported")
+
+
+def _is_log(file: Path) -> bool:
+    try:
+        with file.open("rb") as opened:
+            return opened.read(len(_GZIP)) == _GZIP
+    except OSError as error:
+        raise InvalidInputError(f"{file}: cannot be read: {error.strerror}") from error
+
+
+def _has_memory(file: Path) -> bool:
+    return not is_database(file) or database_holds_memory(file)
+
+
+def merge(
+    first: Annotated[Path, typer.Argument(help="A memory; its names stay.", show_default=False)],
+    second: Annotated[Path, typer.Argument(help="Another memory.", show_default=False)],
+    output: Annotated[Path, typer.Option("--output", "-o", help="The new file.", show_default=False)],
+    json_file: options.JsonFile = None,
+) -> None:
+    """Unite two memories. ATGs of the same name are one object if one of them goes on where the other one is.
+
+    All others are different objects; `memory duplicates` finds those that are not. A database gets the records of
+    both, too.
+
+    Example: atg-fg memory merge robot.db other.json -o both.db
+    """
+    options.check_json_option(json_file)
+    store.check_writable(output)
+    if output.exists():
+        raise InvalidInputError(f"{output}: is already there; expected the path of a new file")
+    union = unite(load_any_memory(first), load_any_memory(second))
+    n_trials = 0
+    if store.goes_to_database(output):
+        n_trials = _save_with_records(union.memory, output, first, second, union.renamed)
+    else:
+        store.save_memory(union.memory, output)
+    document = {
+        "command": "memory merge",
+        "objects": len(union.memory),
+        "same": list(union.same),
+        "renamed": union.renamed,
+        "trials": n_trials,
+    }
+    options.write_json(document, json_file)
+    if json_file != "-":
+        typer.echo(f"{output}: {len(union.memory)} ATGs, {len(union.same)} of them in both; {n_trials} trials")
+        for old, new in union.renamed.items():
+            typer.echo(f"{second}: {old} is {new}")
+
+
+def _save_with_records(memory: RobotMemory, output: Path, first: Path, second: Path, renamed: dict[str, str]) -> int:
+    n_trials = 0
+    with translated(output):
+        connection = open_to_write(output, create=True)
+        try:
+            with written(connection):
+                for file, names in ((first, {}), (second, renamed)):
+                    if is_database(file):
+                        n_trials += add_records(connection, records_in(file, names))[1]
+                replace_memory(connection, memory)
+        finally:
+            connection.close()
+    return n_trials
+
+
+def diff(
+    first: Annotated[Path, typer.Argument(help="A memory.", show_default=False)],
+    second: Annotated[Path, typer.Argument(help="Another memory.", show_default=False)],
+    json_file: options.JsonFile = None,
+) -> int:
+    """Say what the second memory has otherwise than the first; leave with status 1 if there is anything.
+
+    Example: atg-fg memory diff before.json robot.db
+    """
+    options.check_json_option(json_file)
+    found = difference(load_any_memory(first), load_any_memory(second))
+    options.write_json({"command": "memory diff", "same": not found, "difference": found}, json_file)
+    if json_file != "-":
+        for line in _told(found):
+            typer.echo(line)
+    return 1 if found else 0
+
+
+def _told(found: dict[str, Any]) -> list[str]:
+    lines = [f"{name}: {one} / {two}" for name, (one, two) in found.get("assumptions", {}).items()]
+    lines += [f"- {name}" for name in found.get("only_first", ())]
+    lines += [f"+ {name}" for name in found.get("only_second", ())]
+    lines += [f"{old} is called {new}" for old, new in found.get("renamed", {}).items()]
+    for name, changes in found.get("changed", {}).items():
+        told = [f"{what.replace('_', ' ')} {_number(value)}" for what, value in changes.items()]
+        lines.append(f"{name}: {', '.join(told)}")
+    if "order" in found:
+        lines.append("the objects are in another order")
+    if "merges" in found:
+        lines.append("merges: {} / {}".format(*found["merges"]))
+    lines += [f"structure: {name}: {one} / {two}" for name, (one, two) in found.get("structure", {}).items()]
+    return lines
+
+
+def _number(value: Any) -> Any:
+    return len(value) if isinstance(value, list) else value
