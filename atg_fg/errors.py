@@ -4,9 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 
+#: A longer message loses its middle: its beginning says the place, its end what was expected.
+MAX_MESSAGE = 2000
+
 
 class AtgError(Exception):
     """Any error of this project that a user can cause and mend."""
+
+    def __init__(self, message: str = "") -> None:
+        half = MAX_MESSAGE // 2
+        super().__init__(message if len(message) <= MAX_MESSAGE else f"{message[:half]} … {message[-half:]}")
 
 
 class InvalidInputError(AtgError, ValueError):

@@ -79,9 +79,13 @@ def read_integer(value: Any, place: str, least: int) -> int:
 
 
 def read_text(value: Any, place: str) -> str:
-    """Return ``value`` if it is a text that is not empty."""
+    """Return ``value`` if it is a text that is not empty and can be written in UTF-8."""
     if not isinstance(value, str) or not value:
         raise InvalidInputError(f"{place}: {_brief(value)}; expected a text that is not empty")
+    try:
+        value.encode()
+    except UnicodeError as error:  # JSON can say half a character
+        raise InvalidInputError(f"{place}: {_brief(value)}; expected a text of whole characters") from error
     return value
 
 

@@ -71,10 +71,10 @@ def _document(connection: sqlite3.Connection, place: str) -> dict[str, Any]:
         [name for (name,) in connection.execute(f"SELECT name FROM {table} ORDER BY number")]
         for table in ("actions", "slots")
     )
-    graphs: dict[Any, dict[str, Any]] = {
-        number: {"name": name, "aspects": [], "transitions": []}
-        for number, name in connection.execute("SELECT id, name FROM graphs ORDER BY position")
-    }
+    graphs: dict[Any, dict[str, Any]] = {}
+    for number, position, name in connection.execute("SELECT id, position, name FROM graphs ORDER BY position"):
+        read_integer(position, f"{place}: graphs[{len(graphs)}].position", least=0)
+        graphs[number] = {"name": name, "aspects": [], "transitions": []}
     _add_aspects(connection, graphs, place)
     _add_transitions(connection, graphs, actions, place)
     document: dict[str, Any] = {

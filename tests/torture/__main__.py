@@ -1,0 +1,77 @@
+"""``make torture``: all of the torture, and its figures."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections import Counter
+from collections.abc import Sequence
+from typing import Any
+
+from atg_fg.statistics import wilson_interval
+from tests.torture.disk import LEFT, run_scenarios
+from tests.torture.kills import KINDS, kill_writers
+from tests.torture.reading import MAX_BYTES, MAX_SECONDS, read_damaged
+
+
+def main(arguments: Sequence[str]) -> int:
+    """Run what was asked for, print the figures, and return 1 if anything went wrong."""
+    parser = argparse.ArgumentParser(prog="python -m tests.torture", description=__doc__)
+    parser.add_argument("--kills", type=int, default=1000, help="writers that are killed")
+    parser.add_argument("--files", type=int, default=20000, help="damaged files that are read")
+    parser.add_argument("--points", type=int, default=len(LEFT), help="points at which the disk is full")
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--jobs", type=int, default=len(os.sched_getaffinity(0)), help="processes that read files")
+    given = parser.parse_args(arguments)
+    faults: list[str] = []
+    if given.kills:
+        faults += _tell_kills(given.kills, given.seed)
+    if given.points:
+        faults += _tell_disk(run_scenarios(given.points))
+    if given.files:
+        faults += _tell_files(read_damaged(given.files, given.seed, given.jobs))
+    for fault in faults:
+        print(fault)
+    print(f"{len(faults)} faults, seed {given.seed}")
+    return 1 if faults else 0
+
+
+def _tell_kills(n_kills: int, seed: int) -> list[str]:
+    outcomes, faults = kill_writers(n_kills, seed)
+    good = sum(outcomes[kind] for kind in KINDS)
+    print(f"kill -9 while trials are written: {_rate(good, n_kills)} files with all that was said to be written")
+    for kind in KINDS:
+        amid = f"{kind}: in the middle of a trial"
+        there = outcomes[f"{amid}, which was there"]
+        print(f"  {kind}: {outcomes[kind]} well; {outcomes[amid]} in the middle of a trial, {there} of these had it")
+    return faults
+
+
+def _tell_disk(result: dict[str, Any]) -> list[str]:
+    print(f"full disk and read-only folder ({result['way']}): the old state, and this project's error")
+    for name, number in result["well"].items():
+        print(f"  {name}: {number} well")
+    faults: list[str] = result["faults"]
+    return faults
+
+
+def _tell_files(result: dict[str, Any]) -> list[str]:
+    files: Counter[str] = result["files"]
+    total, faults = files.total(), result["faults"]
+    print(f"damaged files: {_rate(total - len(faults), total)} read, or refused with an error of this project")
+    for kind, number in sorted(files.items()):
+        print(f"  {kind}: {number} files, {result['read'][kind]} of them could be read all the same")
+    seconds, mebibytes = result["seconds"], result["bytes"] / 2**20
+    limits = f"at most {MAX_SECONDS:g} s and {MAX_BYTES / 2**20:.0f} MiB are allowed"
+    print(f"  the slowest took {seconds:.2f} s of processor time, the largest {mebibytes:.1f} MiB more RAM; {limits}")
+    return faults
+
+
+def _rate(good: int, total: int) -> str:
+    low, high = wilson_interval(good, total)
+    return f"{good} of {total} ({100 * low:.2f}-{100 * high:.2f} %)"
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,178 @@
+"""Processes that write trials and are killed at random moments; then the file has every trial they said was written.
+
+Writers are forked from one warm process, so that a kill costs milliseconds. A writer says over a pipe when it begins
+and when it has ended each trial. After the kill the file must hold the trials that were said to have ended, or one
+more, and exactly what a memory has learned that went through as many trials.
+"""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import sqlite3
+import tempfile
+import time
+from collections import Counter
+from contextlib import closing
+from pathlib import Path
+
+import numpy as np
+
+from atg_fg import store
+from atg_fg.arcube import make_arcubes
+from atg_fg.assumptions import arcube_assumptions
+from atg_fg.engines import begin_trial
+from atg_fg.errors import AtgError
+from atg_fg.experiments import learn_from
+from atg_fg.memory import RobotMemory
+from atg_fg.parameters import ModelParameters
+from atg_fg.policies import RandomPolicy
+from atg_fg.structure.memory import StructuredMemory, memory_for
+from atg_fg.structure.search import SearchPlan
+from atg_fg.trial import TrialRecord, run_trial
+from atg_fg.worlds import make_world
+
+#: Trials until a writer begins with a new file.
+N_TRIALS = 40
+#: A kill comes at most so many seconds after the fork.
+LONGEST = 0.06
+KINDS = ("database", "database with structure", "JSON")
+_PLAIN = ModelParameters()
+_LEARNED = ModelParameters(learn_structure=True)
+#: Next to no search: it is the writing that is to be cut off.
+_NO_SEARCH = SearchPlan(max_hidden=0, n_chains=1, n_steps=1)
+
+
+class Course:
+    """Trials, and the memory after each of them."""
+
+    def __init__(self, *, structured: bool) -> None:
+        self.parameters = _LEARNED if structured else _PLAIN
+        memory = self.empty()
+        self.records: list[TrialRecord] = []
+        self.states = [store.memory_to_json(memory)]
+        with closing(make_world("ideal", cubes=make_arcubes(12, seed=0))) as world:
+            for number in range(N_TRIALS):
+                inference = begin_trial("bayes-filter", RobotMemory(memory.assumptions, memory), _PLAIN)
+                record = run_trial(world, inference, RandomPolicy(), 8, np.random.default_rng(number))
+                learn_from(record, memory)
+                self.records.append(record)
+                self.states.append(store.memory_to_json(memory))
+
+    def empty(self) -> RobotMemory:
+        return self.prepared(RobotMemory(arcube_assumptions()))
+
+    def prepared(self, memory: RobotMemory) -> RobotMemory:
+        """The memory, ready to learn what this course is about."""
+        memory = memory_for(self.parameters, memory)
+        if isinstance(memory, StructuredMemory):
+            memory.learner.plan = _NO_SEARCH
+        return memory
+
+
+def kill_writers(n_kills: int, seed: int) -> tuple[Counter[str], list[str]]:
+    """Return how many kills of each kind of file came out well, under its name, and what went wrong otherwise."""
+    rng = random.Random(seed)
+    courses = {"database": Course(structured=False), "database with structure": Course(structured=True)}
+    courses["JSON"] = courses["database"]
+    outcomes: Counter[str] = Counter()
+    faults: list[str] = []
+    with tempfile.TemporaryDirectory() as folder:
+        written = dict.fromkeys(KINDS, 0)
+        generation = Counter(KINDS)
+        for number in range(n_kills):
+            kind = KINDS[number % len(KINDS)]
+            course, path = courses[kind], _path(folder, kind, generation[kind])
+            delay = rng.uniform(0.0, LONGEST)
+            begun, ended = _run_and_kill(kind, path, course, written[kind], delay)
+            fault, found = _fault(kind, path, course, written[kind], begun, ended)
+            outcomes[kind] += fault is None
+            if begun > ended:
+                outcomes[f"{kind}: in the middle of a trial"] += 1
+                outcomes[f"{kind}: in the middle of a trial, which was there"] += found > ended
+            if fault is not None:
+                faults.append(f"kill {number} ({kind}, {delay:.4f} s): {fault}")
+            written[kind] = found
+            if fault is not None or found == N_TRIALS:
+                generation[kind] += 1
+                written[kind] = 0
+    return outcomes, faults
+
+
+def _path(folder: str, kind: str, generation: int) -> Path:
+    return Path(folder) / f"{kind.replace(' ', '-')}-{generation}{'.json' if kind == 'JSON' else '.db'}"
+
+
+def _run_and_kill(kind: str, path: Path, course: Course, written: int, delay: float) -> tuple[int, int]:
+    """Return how many trials the writer had begun and ended, those before it included."""
+    reading, writing = os.pipe()
+    child = os.fork()
+    if child == 0:
+        os.close(reading)
+        status = 1
+        try:
+            (_write_json if kind == "JSON" else _write_database)(path, course, written, writing)
+            status = 0
+        finally:
+            os._exit(status)
+    os.close(writing)
+    time.sleep(delay)
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    with open(reading, "rb") as pipe:
+        said = Counter(pipe.read().decode())
+    return written + said["b"], written + said["e"]
+
+
+def _write_database(path: Path, course: Course, written: int, pipe: int) -> None:
+    with course.prepared(RobotMemory.open(path, arcube_assumptions())) as memory:
+        memory.begin_experiment("torture", {"trials": N_TRIALS}, seed=0)
+        for record in course.records[written:]:
+            os.write(pipe, b"b")
+            learn_from(record, memory)
+            os.write(pipe, b"e")
+
+
+def _write_json(path: Path, course: Course, written: int, pipe: int) -> None:
+    for state in course.states[written + 1 :]:
+        os.write(pipe, b"b")
+        store.write_bytes_atomically(path, state.encode())
+        os.write(pipe, b"e")
+
+
+def _fault(kind: str, path: Path, course: Course, before: int, begun: int, ended: int) -> tuple[str | None, int]:
+    """Return what is wrong with the file, if anything, and how many trials it holds."""
+    if not path.exists() or path.stat().st_size == 0:
+        return (None if ended == 0 else f"{ended} trials ended, but there is no file"), 0
+    if kind == "JSON":
+        text = path.read_text()
+        found = course.states.index(text) if text in course.states else -1
+        n_records = found
+    else:
+        try:
+            found, n_records = _found_in_database(path, course)
+        except (AtgError, sqlite3.Error) as error:
+            return f"{error}", before
+    if found == -1 or n_records != found:
+        return f"{n_records} records, and the memory after {found} trials", before
+    if found not in (ended, begun):
+        return f"{found} trials found, {ended} ended, {begun} begun", before
+    return None, found
+
+
+def _found_in_database(path: Path, course: Course) -> tuple[int, int]:
+    """Return after how many trials the memory is what it is, −1 if after none, and how many records there are."""
+    with closing(sqlite3.connect(path)) as connection:
+        if connection.execute("SELECT count(*) FROM sqlite_master").fetchone() == (0,):
+            return 0, 0  # killed before the tables were made
+        if connection.execute("PRAGMA integrity_check").fetchall() != [("ok",)]:
+            return -1, 0
+        if connection.execute("PRAGMA foreign_key_check").fetchall():
+            return -1, 0
+    with RobotMemory.open(path, arcube_assumptions()) as memory:
+        n_records = sum(1 for _ in memory.trials())
+        if not isinstance(memory, StructuredMemory) and course.parameters.learn_structure and n_records == 0:
+            return 0, 0
+        state = store.memory_to_json(memory)
+    return (course.states.index(state) if state in course.states else -1), n_records

@@ -1,0 +1,211 @@
+"""Damaged files are read in other processes: only this project's errors, in bounded time and RAM.
+
+A process that dies did so of the file that it said it was at. A file that takes ten seconds kills it, too.
+"""
+
+from __future__ import annotations
+
+import gc
+import json
+import os
+import resource
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import closing
+from pathlib import Path
+from typing import Any
+
+from atg_fg import store
+from atg_fg.database.checking import faults_of_database
+from atg_fg.errors import AtgError
+from atg_fg.memory import RobotMemory
+from atg_fg.memory_json import memory_from_json
+from atg_fg.scripted_trial import read_script, replay
+from atg_fg.uai_format import read_evidence, read_model
+from atg_fg.uai_inference import log_partition, marginals
+from tests.torture.mutations import FAST, mutated, originals
+
+#: What a file may take: seconds of processor time, and bytes beyond what the process had before.
+MAX_SECONDS = 1.0
+MAX_BYTES = 200 * 2**20
+#: A process has this much address space beyond what it begins with; beyond it there is a ``MemoryError``.
+_ADDRESS_SPACE = 2**30
+_HANGS = 10
+#: Entries of the tables for a UAI model; 8 bytes each.
+_LIMIT = 2**18
+#: Objects times steps times patterns up to which a script is replayed.
+_SHORT = 20_000
+
+
+def read_damaged(n_files: int, seed: int, processes: int = 1) -> dict[str, Any]:
+    """Return how many files of each kind were read or refused, the most that one took, and all that went wrong."""
+    shares = [range(first, n_files, processes) for first in range(min(processes, n_files))]
+    with ThreadPoolExecutor(len(shares)) as executor:
+        parts = list(executor.map(lambda share: _Reader(share, seed).collect(), shares))
+    return {
+        "files": sum((part["files"] for part in parts), Counter()),
+        "read": sum((part["read"] for part in parts), Counter()),
+        "faults": [fault for part in parts for fault in part["faults"]],
+        "seconds": max(part["seconds"] for part in parts),
+        "bytes": max(part["bytes"] for part in parts),
+    }
+
+
+class _Reader:
+    """A process that reads some of the files, and others after it where it dies."""
+
+    def __init__(self, share: range, seed: int) -> None:
+        self._share, self._seed = share, seed
+        self._process = self._started(0)
+
+    def _started(self, done: int) -> subprocess.Popen[str]:
+        share = self._share
+        numbers = [str(share.start + done * share.step), str(share.stop), str(share.step)]
+        command = [sys.executable, "-m", "tests.torture.reading", str(self._seed), *numbers]
+        return subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
+
+    def collect(self) -> dict[str, Any]:
+        """Return what came of all of them."""
+        result: dict[str, Any] = {"files": Counter(), "read": Counter(), "faults": [], "seconds": 0.0, "bytes": 0}
+        done, at = 0, None
+        while done < len(self._share):
+            output = self._process.stdout
+            assert output is not None
+            for line in output:
+                entry = json.loads(line)
+                if "at" in entry:
+                    at = entry
+                    continue
+                done, at = done + 1, None
+                result["files"][entry["kind"]] += 1
+                result["read"][entry["kind"]] += entry["fault"] is None and entry["read"]
+                result["seconds"] = max(result["seconds"], entry["seconds"])
+                result["bytes"] = max(result["bytes"], entry["bytes"])
+                if entry["fault"] is not None:
+                    result["faults"].append(f"file {entry['number']} ({entry['kind']}): {entry['fault']}")
+            status = self._process.wait()
+            output.close()
+            if done < len(self._share):
+                number = self._share[done]
+                what = "process ended" if at is None else f"process died in file {number} ({at['kind']})"
+                result["faults"].append(f"{what}, status {status}")
+                result["files"]["died"] += 1
+                done, at = done + 1, None
+                if done < len(self._share):
+                    self._process = self._started(done)
+        return result
+
+
+def main() -> None:
+    """Read the files from FIRST to below STOP by STEP, of SEED; arguments SEED FIRST STOP STEP."""
+    seed, *numbers = map(int, sys.argv[1:])
+    originals()
+    gc.freeze()
+    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    with tempfile.TemporaryDirectory(dir=FAST) as folder:
+        for number in range(*numbers):
+            kind, content = mutated(seed, number)
+            _say({"at": number, "kind": kind})
+            _say({"number": number, "kind": kind, **measured(kind, content, Path(folder))})
+
+
+def measured(kind: str, content: bytes, folder: Path) -> dict[str, Any]:
+    """Read a file as it may be read; return whether it could be, what went wrong, and what it took."""
+    fault, read = None, False
+    _limit_address_space()
+    before = _peak(reset=True)
+    start = time.process_time()
+    signal.alarm(_HANGS)
+    try:
+        read_as(kind, content, folder)
+        read = True
+    except AtgError as error:
+        if len(str(error)) > 2500:
+            fault = f"a message of {len(str(error))} characters: {str(error)[:200]!r}"
+    except BaseException as error:
+        fault = f"{type(error).__name__}: {str(error)[:300]}"
+    signal.alarm(0)
+    seconds, taken = time.process_time() - start, _peak() - before
+    if fault is None and seconds > MAX_SECONDS:
+        fault = f"{seconds:.2f} s"
+    if fault is None and taken > MAX_BYTES:
+        fault = f"{taken / 2**20:.0f} MiB"
+    return {"read": read, "fault": fault, "seconds": seconds, "bytes": taken}
+
+
+def read_as(kind: str, content: bytes, folder: Path) -> None:
+    """Do with a file what commands do with files of its kind."""
+    path = folder / "damaged"
+    for each in folder.iterdir():
+        each.unlink()
+    path.write_bytes(content)
+    if "database" in kind:
+        _use_database(path)
+    elif "memory" in kind:
+        memory = store.load_memory(path)
+        assert memory_from_json(store.memory_to_json(memory)) == memory
+    elif kind == "script":
+        script = read_script(store.read_text_file(path), str(path))
+        # A sound script may ask for a long trial among many objects. To answer it is work, and no failure.
+        if (len(script.memory) + 1) * len(script.steps) * len(script.memory.assumptions.alphabet) <= _SHORT:
+            replay(script, "gtsam", smooth=True)
+    elif kind == "UAI model":
+        model = read_model(store.read_text_file(path), str(path))
+        log_partition(model, limit=_LIMIT)
+        marginals(model, limit=_LIMIT)
+    else:
+        evidence = read_evidence(store.read_text_file(path), str(path))
+        original = read_model(originals()["UAI model"][-1].decode())
+        original.check_evidence(evidence)
+
+
+def _use_database(path: Path) -> None:
+    """Check, load, learn in place: what one of these refuses the next ones must refuse or survive, too."""
+    errors: list[AtgError] = []
+    for use in (faults_of_database, store.load_memory, _learn_in_place):
+        try:
+            use(path)
+        except AtgError as error:
+            errors.append(error)
+    if errors:
+        raise errors[0]
+
+
+def _learn_in_place(path: Path) -> None:
+    with closing(RobotMemory.open(path)) as memory:
+        list(memory.experiments())
+        n_trials = sum(1 for _ in memory.trials())
+        memory.learn([0, 1, 2], [0, 0], None)
+        assert sum(1 for _ in memory.trials()) == n_trials
+        if len(memory) > 1:
+            memory.merge(memory.names[0], memory.names[1])
+
+
+def _limit_address_space() -> None:
+    with open("/proc/self/statm") as file:
+        pages = int(file.read().split()[0])
+    most = pages * resource.getpagesize() + _ADDRESS_SPACE
+    resource.setrlimit(resource.RLIMIT_AS, (most, resource.RLIM_INFINITY))
+
+
+def _peak(*, reset: bool = False) -> int:
+    """Return the most RAM that this process had at once, since the last reset."""
+    if reset:
+        with open("/proc/self/clear_refs", "w") as file:
+            file.write("5")
+    with open("/proc/self/status") as file:
+        (line,) = (line for line in file if line.startswith("VmHWM"))
+    return int(line.split()[1]) * 1024
+
+
+def _say(entry: dict[str, Any]) -> None:
+    os.write(1, (json.dumps(entry) + "\n").encode())
+
+
+if __name__ == "__main__":
+    main()
