@@ -79,7 +79,9 @@ def read_experiments(connection: sqlite3.Connection, place: str) -> Iterator[Exp
     Raises:
         InvalidInputError: One that is not as it should be; the message names ``place``.
     """
-    for number, kind, seed, parameters, version in connection.execute("SELECT * FROM experiments ORDER BY id"):
+    for number, kind, seed, parameters, version in connection.execute(
+        "SELECT id, kind, seed, parameters, version FROM experiments ORDER BY id"
+    ):
         where = f"{place}: experiment {number}"
         given = _json(parameters, f"{where}: parameters")
         if not isinstance(given, dict):

@@ -35,7 +35,7 @@ from atg_fg.worlds import make_world
 
 #: Trials until a writer begins with a new file.
 N_TRIALS = 40
-#: A kill comes at most so many seconds after the fork.
+#: A kill comes at most so many seconds after the fork, or after the first trial was begun.
 LONGEST = 0.06
 KINDS = ("database", "database with structure", "JSON")
 _PLAIN = ModelParameters()
@@ -84,8 +84,8 @@ def kill_writers(n_kills: int, seed: int) -> tuple[Counter[str], list[str]]:
         for number in range(n_kills):
             kind = KINDS[number % len(KINDS)]
             course, path = courses[kind], _path(folder, kind, generation[kind])
-            delay = rng.uniform(0.0, LONGEST)
-            begun, ended = _run_and_kill(kind, path, course, written[kind], delay)
+            delay, at_work = rng.uniform(0.0, LONGEST), rng.random() < 0.7
+            begun, ended = _run_and_kill(kind, path, course, written[kind], delay, at_work=at_work)
             fault, found = _fault(kind, path, course, written[kind], begun, ended)
             outcomes[kind] += fault is None
             if begun > ended:
@@ -104,8 +104,13 @@ def _path(folder: str, kind: str, generation: int) -> Path:
     return Path(folder) / f"{kind.replace(' ', '-')}-{generation}{'.json' if kind == 'JSON' else '.db'}"
 
 
-def _run_and_kill(kind: str, path: Path, course: Course, written: int, delay: float) -> tuple[int, int]:
-    """Return how many trials the writer had begun and ended, those before it included."""
+def _run_and_kill(
+    kind: str, path: Path, course: Course, written: int, delay: float, *, at_work: bool
+) -> tuple[int, int]:
+    """Return how many trials the writer had begun and ended, those before it included.
+
+    The delay counts from the fork, or, if ``at_work``, from when the writer begins its first trial.
+    """
     reading, writing = os.pipe()
     child = os.fork()
     if child == 0:
@@ -117,11 +122,12 @@ def _run_and_kill(kind: str, path: Path, course: Course, written: int, delay: fl
         finally:
             os._exit(status)
     os.close(writing)
-    time.sleep(delay)
-    os.kill(child, signal.SIGKILL)
-    os.waitpid(child, 0)
     with open(reading, "rb") as pipe:
-        said = Counter(pipe.read().decode())
+        first = pipe.read(1) if at_work else b""
+        time.sleep(delay)
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
+        said = Counter((first + pipe.read()).decode())
     return written + said["b"], written + said["e"]
 
 
