@@ -50,7 +50,7 @@ _VALUES: tuple[Any, ...] = (
 @cache
 def originals() -> dict[str, list[bytes]]:
     """Sound files of each kind."""
-    plain, structured = _memory(structured=False, n_trials=5), _memory(structured=True, n_trials=3)
+    plain, structured = _memory(structured=False, n_trials=5), _memory(structured=True, n_trials=2)
     exported = export_trial(read_script(_SCRIPT.read_text()))
     return {
         "memory": [store.memory_to_json(plain).encode()],
@@ -59,7 +59,7 @@ def originals() -> dict[str, list[bytes]]:
         "UAI model": [_UAI.encode(), write_model(exported.model).encode()],
         "UAI evidence": [b"2 0 1 2 0\n", b"1\n1 3 2\n", write_evidence(exported.evidence).encode()],
         "database": [_database(plain, n_trials=4)],
-        "structured database": [_database(structured, n_trials=2)],
+        "structured database": [_database(structured, n_trials=1)],
     }
 
 
@@ -133,17 +133,22 @@ def _damaged_document(rng: random.Random, content: bytes) -> bytes:
         key = rng.choice(keys)
         change = rng.randrange(6)
         if change < 3:
-            holder[key] = rng.choice(_VALUES)
+            holder[key] = _copy(rng.choice(_VALUES))
         elif change == 3:
             del holder[key]
         elif change == 4 and isinstance(holder, list):
-            holder[key:key] = [json.loads(json.dumps(holder[key]))] * rng.choice((1, 2, 100))
+            holder[key:key] = [_copy(holder[key]) for _ in range(rng.choice((1, 2, 100)))]
         else:
             other = rng.choice(holders)
-            holder[key] = json.loads(json.dumps(other))
+            holder[key] = _copy(other)
         if not isinstance(document, (dict, list)) or not document:
             break
     return json.dumps(document).encode()
+
+
+def _copy(value: Any) -> Any:
+    """Return a value of its own: what is put into one document must not be changed by what is done to another one."""
+    return json.loads(json.dumps(value))
 
 
 def _enlarge(rng: random.Random, document: dict[str, Any]) -> None:

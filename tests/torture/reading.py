@@ -1,6 +1,7 @@
 """Damaged files are read in other processes: only this project's errors, in bounded time and RAM.
 
-A process that dies did so of the file that it said it was at. A file that takes ten seconds kills it, too.
+A process that dies did so of the file that it said it was at. A file that takes ten seconds of processor time
+kills it, too.
 """
 
 from __future__ import annotations
@@ -106,7 +107,7 @@ def main() -> None:
     seed, *numbers = map(int, sys.argv[1:])
     originals()
     gc.freeze()
-    signal.signal(signal.SIGALRM, signal.SIG_DFL)
+    signal.signal(signal.SIGPROF, signal.SIG_DFL)
     with tempfile.TemporaryDirectory(dir=FAST) as folder:
         for number in range(*numbers):
             kind, content = mutated(seed, number)
@@ -120,7 +121,7 @@ def measured(kind: str, content: bytes, folder: Path) -> dict[str, Any]:
     _limit_address_space()
     before = _peak(reset=True)
     start = time.process_time()
-    signal.alarm(_HANGS)
+    signal.setitimer(signal.ITIMER_PROF, _HANGS)
     try:
         read_as(kind, content, folder)
         read = True
@@ -129,7 +130,7 @@ def measured(kind: str, content: bytes, folder: Path) -> dict[str, Any]:
             fault = f"a message of {len(str(error))} characters: {str(error)[:200]!r}"
     except BaseException as error:
         fault = f"{type(error).__name__}: {str(error)[:300]}"
-    signal.alarm(0)
+    signal.setitimer(signal.ITIMER_PROF, 0)
     seconds, taken = time.process_time() - start, _peak() - before
     if fault is None and seconds > MAX_SECONDS:
         fault = f"{seconds:.2f} s"

@@ -1,0 +1,75 @@
+"""Files of every version that was ever written still load: one small file each in tests/data/formats."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from atg_fg import store
+from atg_fg.ablation import AblationLog, Cell
+from atg_fg.database.copying import records_in_log
+from atg_fg.goal_records import GoalRunFile
+from atg_fg.memory import RobotMemory
+from atg_fg.presets import preset
+from atg_fg.scripted_trial import read_script
+from atg_fg.structure.memory import StructuredMemory
+from atg_fg.trial_log import read_trials
+
+FORMATS = Path(__file__).parent / "data" / "formats"
+
+
+def test_memory_1() -> None:
+    memory = store.load_memory(FORMATS / "memory-1.json")
+    assert memory.names == ("object-000", "object-001")
+    assert store.memory_to_json(memory) == (FORMATS / "memory-1.json").read_text()
+
+
+def test_memory_1_with_structure_and_merges() -> None:
+    memory = store.load_memory(FORMATS / "memory-1-structured.json")
+    assert isinstance(memory, StructuredMemory)
+    assert (memory.names, len(memory.learner.trials)) == (("object-000",), 2)
+    assert [merge.dropped.name for merge in memory.merges] == ["object-001"]
+    assert store.memory_to_json(memory) == (FORMATS / "memory-1-structured.json").read_text()
+
+
+@pytest.mark.parametrize("name", ["memory-1.json", "memory-1-structured.json", "memory-schema-1.db"])
+def test_every_memory_goes_into_a_database_and_back(name: str, tmp_path: Path) -> None:
+    memory = store.load_memory(FORMATS / name)
+    store.save_memory(memory, tmp_path / "robot.db")
+    store.save_memory(store.load_memory(tmp_path / "robot.db"), tmp_path / "memory.json")
+    assert store.load_memory(tmp_path / "memory.json") == memory
+
+
+def test_database_schema_1(tmp_path: Path) -> None:
+    with RobotMemory.open(shutil.copy(FORMATS / "memory-schema-1.db", tmp_path)) as memory:
+        assert memory.names == ("object-000", "object-001")
+        assert [(each.kind, each.seed) for each in memory.experiments()] == [("trial", 0)]
+        assert [trial.learned for trial in memory.trials()] == ["object-000", "object-001"]
+
+
+def test_test_1() -> None:
+    assert [line["verdict"] for line in read_trials(FORMATS / "test-1.jsonl.gz")] == ["novel", "novel"]
+    experiment, trials = records_in_log(FORMATS / "test-1.jsonl.gz")
+    assert (experiment.seed, experiment.parameters) == (3, {"world": "ideal"})
+    assert [trial.line() for trial in trials] == read_trials(FORMATS / "test-1.jsonl.gz")
+
+
+def test_goal_run_1() -> None:
+    (first, *_) = GoalRunFile(FORMATS / "goal-run-1.json.gz", {"seed": 0, "run": 0}).read()
+    assert first.goal is not None
+
+
+def test_preset_1() -> None:
+    assert preset(str(FORMATS / "preset-1.json")).observation_noise == 0.0005
+
+
+def test_ablation_1(tmp_path: Path) -> None:
+    log = AblationLog(Path(shutil.copy(FORMATS / "ablation-1.jsonl", tmp_path)), n_trials=5)
+    result = log.get(Cell("default", "ideal", "ideal", 4), 0)
+    assert result is not None
+    assert result.success == (4, 5)
+
+
+def test_scripted_trial_1() -> None:
+    file = FORMATS.parent / "scripted_trial.json"
+    assert len(read_script(file.read_text()).steps) == 3
