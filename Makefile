@@ -5,7 +5,8 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-all lint format notebooks docs bench results results-engines results-robot results-goal results-structure clean
+.PHONY: help setup demo test test-all torture lint format notebooks docs bench results results-engines results-robot results-goal \
+	results-structure clean
 
 help:  ## Say what there is to make
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -28,6 +29,9 @@ test: $(READY)  ## Run the tests
 
 test-all: $(READY)  ## Run the tests, slow ones too
 	$(BIN)/python -m pytest -n auto --dist loadfile -m ''
+
+torture: $(READY)  ## Kill writers, fill disks, damage files, and look at what is left (half an hour on 2 cores)
+	$(BIN)/python -m tests.torture --kills 1000 --files 20000
 
 lint: $(READY)  ## Check style and types
 	$(BIN)/ruff check .
