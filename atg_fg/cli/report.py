@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from atg_fg import store
+from atg_fg.large_memory.files import load_any_memory
 from atg_fg.report.page import environment, write_report
 from atg_fg.report.reading import read_report
 
@@ -16,8 +17,8 @@ def report(
     file: Annotated[
         Path,
         typer.Argument(
-            help="A trial's record (.jsonl), the trials of a test (.jsonl.gz), a run of the goal experiment (.json.gz) "
-            "or the result of an experiment (.json).",
+            help="A trial's record (.jsonl), the trials of a test (.jsonl.gz), a run of the goal experiment "
+            "(.json.gz), a robot memory database (.db) or the result of an experiment (.json).",
             show_default=False,
         ),
     ],
@@ -34,7 +35,7 @@ def report(
     """
     store.check_writable(output)
     environment()  # fails now rather than at the end, if Jinja2 is not installed
-    remembered = store.load_memory(memory) if memory is not None else None
+    remembered = load_any_memory(memory) if memory is not None else None
     made = read_report(file, remembered)
     write_report(made, output)
     typer.echo(f"saved: {output}")

@@ -7,10 +7,12 @@ import zlib
 from pathlib import Path
 from typing import Any, Final
 
+from atg_fg.database.connection import is_database
 from atg_fg.errors import InvalidInputError
 from atg_fg.json_format import parse_json
 from atg_fg.memory import RobotMemory
 from atg_fg.report.content import Report
+from atg_fg.report.database import read_database
 from atg_fg.report.experiments import EXPERIMENTS, read_experiment
 from atg_fg.report.goal_run import GOAL_RUN_FORMAT, read_goal_run
 from atg_fg.report.test_log import read_test_log
@@ -21,6 +23,7 @@ from atg_fg.trial import TRIAL_FORMAT
 _GZIP: Final = b"\x1f\x8b"
 _EXPECTED: Final = (
     "expected a trial's record (trial --record), the trials of a test (table1 --records), a run (goal --records), "
+    "the trials in a robot memory database, "
     f"or a result (--json) of: {', '.join(EXPERIMENTS)}"
 )
 
@@ -29,7 +32,8 @@ def read_report(path: Path, memory: RobotMemory | None = None) -> Report:
     """Return the page of a file.
 
     Args:
-        path: A trial's record, the trials of a test, a run of the goal experiment, or the JSON of an experiment.
+        path: A trial's record, the trials of a test, a run of the goal experiment, a robot memory database, or the
+            JSON of an experiment.
         memory: That the trial began with, if it is at hand.
 
     Raises:
@@ -41,6 +45,8 @@ def read_report(path: Path, memory: RobotMemory | None = None) -> Report:
     except (OSError, ValueError) as error:
         reason = error.strerror if isinstance(error, OSError) else error
         raise InvalidInputError(f"{path}: cannot be read: {reason}; {_EXPECTED}") from error
+    if is_database(path):
+        return read_database(path, memory)
     if start.startswith(_GZIP):
         return read_goal_run(path, memory) if _is_goal_run(start) else read_test_log(path, memory)
     text = read_text_file(path)

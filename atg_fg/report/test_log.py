@@ -7,7 +7,7 @@ recorded of it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
@@ -45,17 +45,32 @@ def read_test_log(path: Path, memory: RobotMemory | None) -> Report:
     Raises:
         InvalidInputError: The file is not as it should be, or its world is not known.
     """
-    header, summaries = read_log(path)
+    return test_report(*read_log(path), path, memory)
+
+
+def test_report(
+    header: Mapping[str, Any], summaries: Sequence[Mapping[str, Any]], path: Path, memory: RobotMemory | None
+) -> Report:
+    """Return the page of a test's trials.
+
+    Args:
+        header: What test it is: its seed, and what its plan has other than usual.
+        summaries: Of its trials, in their order.
+        path: Where they come from, for messages.
+        memory: As for ``read_test_log``.
+
+    Raises:
+        InvalidInputError: As for ``read_test_log``.
+    """
     if not summaries:
         raise InvalidInputError(f"{path}: no trials; expected at least one")
     plan = _plan(header, path)
     assumptions = memory.assumptions if memory is not None else _assumptions(plan, path)
     test = _Test(plan, assumptions)
     pages = [test.page(summary, number, f"{path}: trial {number}") for number, summary in enumerate(summaries)]
-    parameters = {key: value for key, value in header.items() if key not in ("format", "version")}
     title = f"A test of {len(pages)} trials, {test.score.successes} of them right"
     notes = () if test.inferred else (_NOT_INFERRED,)
-    return Report(title, shown_parameters({"trials": len(pages), **parameters}), notes, assumptions, tuple(pages))
+    return Report(title, shown_parameters({"trials": len(pages), **header}), notes, assumptions, tuple(pages))
 
 
 class _Test:

@@ -8,7 +8,10 @@ from pathlib import Path
 
 import pytest
 
+from atg_fg.assumptions import arcube_assumptions
 from atg_fg.errors import AtgError, InvalidInputError
+from atg_fg.experiments import TestPlan, learn_from, run_test
+from atg_fg.memory import RobotMemory
 from atg_fg.report.experiments import EXPERIMENTS
 from atg_fg.report.reading import read_report
 from atg_fg.trial_log import read_log
@@ -50,6 +53,34 @@ def test_each_look_points_at_the_graph_of_what_would_be_judged_then(trial, recor
     assert set(graph.aspects) == set(remembered.aspects) | seen
 
 
+def test_a_test_in_a_database_is_told_as_its_log_is(test_log, tmp_path):
+    plan = TestPlan(engine="bayes-filter", n_trials=12, n_actions=6, n_objects=4)
+    run_test(plan, 3, tmp_path / "records.db")
+    assert read_report(tmp_path / "records.db").trials == read_report(test_log).trials
+
+
+def test_trials_that_a_database_was_taught_show_what_they_were_learned_into(trial, tmp_path):
+    memory, run = trial
+    path = tmp_path / "robot.db"
+    with RobotMemory.open(path, memory.assumptions) as kept:
+        kept.add(memory["object-000"])
+        kept.begin_experiment("trial", {"preset": "default"}, 5)
+        learn_from(run, kept)
+    report = read_report(path)
+    (page,) = report.trials
+    assert report.parameters == {"seed": "5", "preset": "default"}
+    assert page.verdict == "object-000"
+    assert {page.graphs[look.graph].name for look in page.looks} == {"object-000"}
+    assert [look.entropy for look in page.looks] == [step.belief.entropy for step in run.steps]
+    assert [value for _, value in page.looks[0].expected] == run.steps[0].expected_entropies.tolist()
+
+
+def test_a_database_without_trials_is_refused(tmp_path):
+    RobotMemory.open(tmp_path / "robot.db", arcube_assumptions()).close()
+    with pytest.raises(InvalidInputError, match="no trials; expected at least one"):
+        read_report(tmp_path / "robot.db")
+
+
 def test_without_a_memory_the_graph_is_of_the_trial_and_a_note_says_so(record):
     report = read_report(record)
     assert {graph.name for graph in report.trials[0].graphs} == {"what the trial has shown"}
@@ -84,10 +115,10 @@ def test_what_a_test_leaves_out_is_inferred_again(test_log):
 
 
 def test_a_belief_that_does_not_lead_to_what_was_recorded_is_not_shown(test_log, tmp_path):
-    header, summaries = read_log(test_log)
-    summaries[5]["unseen"][1] = 0.123
+    lines = [json.loads(line) for line in gzip.decompress(test_log.read_bytes()).splitlines()]
+    lines[6]["unseen"][1] = 0.123  # the first line is the header
     other = tmp_path / "test-0003.jsonl.gz"
-    other.write_bytes(b"".join(gzip.compress(json.dumps(line).encode() + b"\n") for line in [header, *summaries]))
+    other.write_bytes(b"".join(gzip.compress(json.dumps(line).encode() + b"\n") for line in lines))
     report = read_report(other)
     assert [bool(page.looks[0].objects) for page in report.trials[4:7]] == [True, False, False]
     assert "not inferred again" in report.notes[0]
