@@ -70,7 +70,7 @@ def test_report(
     pages = [test.page(summary, number, f"{path}: trial {number}") for number, summary in enumerate(summaries)]
     title = f"A test of {len(pages)} trials, {test.score.successes} of them right"
     notes = () if test.inferred else (_NOT_INFERRED,)
-    return Report(title, shown_parameters({"trials": len(pages), **header}), notes, assumptions, tuple(pages))
+    return Report(title, shown_parameters(header), notes, assumptions, tuple(pages))
 
 
 class _Test:
