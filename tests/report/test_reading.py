@@ -232,6 +232,7 @@ def test_another_memory_is_refused(trial, record):
          "trial 0: key 'observed' is missing"),
         (b"[" * 100_000, "not valid JSON"),
     ],
+    ids=lambda value: value if isinstance(value, str) else "file",
 )  # fmt: skip
 def test_a_file_of_another_kind_is_refused(tmp_path, content, message):
     path = tmp_path / "file"
