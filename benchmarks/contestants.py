@@ -11,6 +11,7 @@ import numpy as np
 from atg_fg.engines import ENGINES, begin_trial
 from atg_fg.engines.base import Inference
 from atg_fg.engines.gtsam_elimination import GtsamElimination
+from atg_fg.large_memory.compact_memory import CompactMemory
 from atg_fg.memory import RobotMemory
 from atg_fg.patterns import Evidence, FloatArray
 from atg_fg.presets import preset
@@ -19,6 +20,7 @@ from benchmarks.memories import Course
 
 #: What the others are held against.
 REFERENCE: Final = "bayes-filter"
+LARGE_MEMORY: Final = "large-memory"
 #: Exact engines and peers agree with the reference to this, in probability and in nats.
 TOLERANCE: Final = 1e-9
 #: The naive way is timed on so many of all patterns.
@@ -72,22 +74,23 @@ class EngineContestant(Contestant):
         name: In ``ENGINES``.
         preset_name: Name of a preset.
         memory: The robot memory.
+        options: Of the engine.
 
     Raises:
         AtgError: The engine does not take this preset or this memory.
     """
 
-    def __init__(self, name: str, preset_name: str, memory: RobotMemory) -> None:
+    def __init__(self, name: str, preset_name: str, memory: RobotMemory, **options: Any) -> None:
         self.name, self.preset = name, preset_name
         self.same_model = not preset(preset_name).learn_structure
         self.tolerance = TOLERANCE if ENGINES[name].exact else None
-        self._memory = memory
+        self._memory, self._options = memory, options
         self._inference: Inference
         self.begin()
 
     def begin(self) -> None:
         """Begin a trial, which makes the tables of the memory."""
-        self._inference = begin_trial(self.name, self._memory, preset(self.preset))
+        self._inference = begin_trial(self.name, self._memory, preset(self.preset), **self._options)
 
     def look(self, evidence: Evidence) -> None:
         """Take in a look at a whole pattern."""
@@ -104,6 +107,11 @@ class EngineContestant(Contestant):
     def identity(self) -> FloatArray:
         """Return p(O | z_0:t, a_1:t), shape [H]."""
         return self._inference.identity().probabilities
+
+
+def large_memory(preset_name: str, memory: RobotMemory) -> EngineContestant:
+    """Return the engine for large memories on arrays, as one would use it, and by its own way at any size."""
+    return EngineContestant(LARGE_MEMORY, preset_name, CompactMemory.of(memory), n_exact=0)
 
 
 def follow(contestant: Contestant, course: Course, clock: Clock) -> Sample:

@@ -7,11 +7,10 @@ from typing import Any, Final
 
 from atg_fg.engines import ENGINES
 from atg_fg.errors import AtgError
-from benchmarks.contestants import EngineContestant, follow
+from benchmarks.contestants import LARGE_MEMORY, follow, large_memory
 from benchmarks.measuring import Clock, alternate, median_of, ratios, spread
 from benchmarks.memories import N_MATCHING, equal_matches, matching_course
 
-ENGINE: Final = "large-memory"
 PRESET: Final = "default"
 N_ACTIONS: Final = 10
 #: A trial is short here: each round takes the median of so many.
@@ -20,14 +19,14 @@ REPEATS: Final = 5
 
 def measure(small: int, large: int, n_rounds: int, clock: Clock) -> dict[str, Any]:
     """Return what a trial takes at two sizes side by side, or why it was left out."""
-    about = {"engine": ENGINE, "preset": PRESET, "sizes": [small, large], "matching": min(N_MATCHING, small)}
-    if ENGINE not in ENGINES:
-        return {**about, "left_out": f"no engine {ENGINE!r} is registered"}
+    about = {"engine": LARGE_MEMORY, "preset": PRESET, "sizes": [small, large], "matching": min(N_MATCHING, small)}
+    if LARGE_MEMORY not in ENGINES:
+        return {**about, "left_out": f"no engine {LARGE_MEMORY!r} is registered"}
     try:
         works = {}
         for size in (small, large):
             memory = equal_matches(size)
-            contestant = EngineContestant(ENGINE, PRESET, memory)
+            contestant = large_memory(PRESET, memory)
             course = matching_course(memory, N_ACTIONS)
             follow(contestant, course, clock)
             works[str(size)] = partial(

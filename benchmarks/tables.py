@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from benchmarks.matches import ENGINE
+from benchmarks.contestants import LARGE_MEMORY
 from benchmarks.trials import reference_of
 
 QUANTITIES: Final = {
@@ -202,7 +202,7 @@ def _floor_table(document: dict[str, Any]) -> Table:
 def _matches_table(document: dict[str, Any]) -> Table:
     matches = document["equal_matches"]
     small, large = (f"{size:,}" for size in matches["sizes"])
-    title = f"`{ENGINE}` with {matches['matching']} matching objects of {small} and of {large}"
+    title = f"`{LARGE_MEMORY}` with {matches['matching']} matching objects of {small} and of {large}"
     headings = ["", f"{small}, ms", f"{large}, ms", "ratio"]
     if "left_out" in matches:
         return Table(title, headings, [], [f"Left out: {matches['left_out']}."])

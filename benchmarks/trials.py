@@ -11,7 +11,16 @@ from atg_fg.engines import ENGINES
 from atg_fg.errors import AtgError
 from atg_fg.memory import RobotMemory
 from atg_fg.presets import preset
-from benchmarks.contestants import REFERENCE, Contestant, EngineContestant, NaiveGraphs, agreement, follow
+from benchmarks.contestants import (
+    LARGE_MEMORY,
+    REFERENCE,
+    Contestant,
+    EngineContestant,
+    NaiveGraphs,
+    agreement,
+    follow,
+    large_memory,
+)
 from benchmarks.dense_model import dense_model, table_bytes
 from benchmarks.measuring import Clock, Sample, alternate, median_of, ratios, repeats_for, spread
 from benchmarks.memories import Course, course_for, remembered, with_learned_structure
@@ -21,7 +30,7 @@ from benchmarks.peers import PEERS, PRESET, make_peer
 ENGINE_PRESETS: Final = (
     (REFERENCE, ("paper", "default")),
     ("gtsam", ("paper", "default")),
-    ("large-memory", ("paper", "default")),
+    (LARGE_MEMORY, ("paper", "default")),
     ("learned-structure", ("learned",)),
 )
 #: Learning the structure of more objects takes long.
@@ -133,6 +142,8 @@ def contestants(memory: RobotMemory, most_bytes: float) -> Iterator[tuple[str, s
 
 
 def _engine(name: str, preset_name: str, memory: RobotMemory) -> Contestant:
+    if name == LARGE_MEMORY:
+        return large_memory(preset_name, memory)
     if not preset(preset_name).learn_structure:
         return EngineContestant(name, preset_name, memory)
     if len(memory) > MOST_LEARNED:
