@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
+from atg_fg.belief_table import SHOWN, BeliefTable
 from atg_fg.errors import InvalidInputError
 from atg_fg.patterns import FloatArray
 
@@ -59,6 +61,21 @@ class IdentityBelief:
     def probabilities(self) -> FloatArray:
         """Probability of each state of O, shape [K + 1]: the remembered objects, then *unseen*."""
         return np.append(self.objects, self.unseen)
+
+    def named(self, names: Sequence[str], shown: int = SHOWN) -> BeliefTable:
+        """Return the belief with the names of the remembered objects, as a table that a notebook shows.
+
+        Args:
+            names: One for each remembered object, in the order of their index.
+            shown: How many objects are shown one by one, the most probable first.
+
+        Raises:
+            InvalidInputError: Another number of names, or ``shown`` is below one.
+        """
+        return BeliefTable(self, names, shown)
+
+    def _repr_html_(self) -> str:
+        return self.named([f"object {index}" for index in range(len(self.objects))])._repr_html_()
 
     def check(self, n_objects: int, n_unseen: int) -> None:
         """Check that this is a distribution over ``n_objects`` remembered objects and ``n_unseen`` unseen ones.

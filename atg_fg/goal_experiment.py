@@ -25,6 +25,7 @@ from atg_fg.memory_learning import complete_memory, learned_memory
 from atg_fg.parameters import ModelParameters
 from atg_fg.policies import POLICIES, GoalPolicy, make_policy
 from atg_fg.policies.goal import PLANNERS, SETTLED, UNREACHABLE
+from atg_fg.result_tables import table_of_goals
 from atg_fg.stations import AtStation, make_stations
 from atg_fg.store import make_folder
 from atg_fg.trial import TrialRecord, run_trial
@@ -100,6 +101,9 @@ class GoalRun:
 
     served: tuple[ServedObject, ...]
     records: tuple[TrialRecord, ...]
+
+    def _repr_html_(self) -> str:
+        return table_of_goals(self.served)._repr_html_()
 
 
 def run_goals(

@@ -13,6 +13,7 @@ from atg_fg.goal_planning import nearest_aspect, shortest_path, transitions_of_g
 from atg_fg.goals import Goal
 from atg_fg.graph import AspectTransitionGraph
 from atg_fg.memory import RobotMemory
+from atg_fg.result_tables import table_of_goals
 from atg_fg.statistics import mean, wilson_interval
 from atg_fg.trial import TrialRecord
 
@@ -54,6 +55,9 @@ class ServedObject:
     def wrong_object(self) -> bool:
         """Whether the robot took the object for another, or for a new one."""
         return self.judged_new or self.matched not in (None, self.object)
+
+    def _repr_html_(self) -> str:
+        return table_of_goals([self])._repr_html_()
 
 
 def score(

@@ -10,6 +10,7 @@ import numpy as np
 
 from atg_fg.assumptions import MAX_NUMBER, Assumptions
 from atg_fg.errors import InvalidInputError
+from atg_fg.notebook_views import graph_view
 from atg_fg.patterns import IntArray, Pattern
 
 #: Node of the networkx view that stands for all unobserved aspects.
@@ -213,6 +214,9 @@ class AspectTransitionGraph:
         )
 
     __hash__ = None  # type: ignore[assignment]  # mypy's usual complaint; graphs grow, so they are no keys
+
+    def _repr_html_(self) -> str:
+        return graph_view(self)._repr_html_()
 
     def __repr__(self) -> str:
         return (

@@ -9,6 +9,7 @@ from atg_fg.assumptions import Assumptions
 from atg_fg.errors import InvalidInputError, unknown_name
 from atg_fg.graph import AspectTransitionGraph
 from atg_fg.merging import Merge, check_merges
+from atg_fg.notebook_views import memory_view
 from atg_fg.patterns import Detection
 from atg_fg.persistence import Persistent, one_transaction
 
@@ -214,6 +215,9 @@ class RobotMemory(Persistent):
         return (self.assumptions, list(self), self.merges) == (other.assumptions, list(other), other.merges)
 
     __hash__ = None  # type: ignore[assignment]
+
+    def _repr_html_(self) -> str:
+        return memory_view(self)._repr_html_()
 
     def __repr__(self) -> str:
         return f"RobotMemory({len(self)} of {self.assumptions.n_objects} objects)"

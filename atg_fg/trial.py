@@ -14,6 +14,7 @@ from atg_fg.belief import IdentityBelief
 from atg_fg.engines.base import Inference
 from atg_fg.errors import InvalidInputError
 from atg_fg.json_format import plain_json, write_assumptions
+from atg_fg.notebook_views import record_view
 from atg_fg.patterns import Detection, Evidence, FloatArray
 from atg_fg.policies import Policy
 from atg_fg.worlds import World, assumptions_of, detection_of
@@ -106,6 +107,12 @@ class TrialRecord:
     def actions(self) -> list[int]:
         """Index of each action, in order."""
         return [step.action for step in self.steps if step.action is not None]
+
+    def _repr_html_(self) -> str:
+        return record_view(self)._repr_html_()
+
+    def __repr__(self) -> str:
+        return f"<{record_view(self).title}>"
 
     def to_json_lines(self, frames: Sequence[str] = (), **header: Any) -> str:
         """Return the record as JSON lines: a header, a line a step, the verdict.

@@ -18,6 +18,7 @@ from typing import Any
 from atg_fg.assumptions import Assumptions
 from atg_fg.errors import InvalidInputError
 from atg_fg.json_format import plain_json
+from atg_fg.notebook_views import outcome_view
 from atg_fg.patterns import Detection, Evidence
 from atg_fg.store import check_writable, write_bytes_atomically
 from atg_fg.trial import TrialRecord, Verdict
@@ -53,6 +54,9 @@ class TrialOutcome:
         seen = record.patterns if patterns is None else patterns
         detections = tuple(record.detections)
         return cls(record.verdict, record.matched, tuple(seen), tuple(record.actions), truth, detections)
+
+    def _repr_html_(self) -> str:
+        return outcome_view(self)._repr_html_()
 
 
 class TrialLog:

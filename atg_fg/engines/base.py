@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import ClassVar, NamedTuple
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
 from atg_fg.belief import IdentityBelief, log_of
+from atg_fg.belief_table import SHOWN, BeliefTable
 from atg_fg.chain import Chain, History, build_chain
 from atg_fg.errors import ImpossibleEvidenceError, InvalidInputError
 from atg_fg.imagined import ImaginedBelief, TableBelief
@@ -33,6 +36,8 @@ class Inference(ABC):
     name: ClassVar[str]
     exact: ClassVar[bool]
     knows_structure: ClassVar[bool] = False
+    #: The engine's own options that ``begin_trial`` was given.
+    options: Mapping[str, Any] = MappingProxyType({})
 
     def __init__(self, memory: RobotMemory, parameters: ModelParameters, prior: IdentityBelief | None = None) -> None:
         self.memory = memory
@@ -83,6 +88,14 @@ class Inference(ABC):
         """
         self._check_looked("expected entropy")
         return self._expected_entropies()
+
+    def belief_table(self, shown: int = SHOWN) -> BeliefTable:
+        """Return p(O | z_0:t, a_1:t) with the names of the objects, as a table that a notebook shows.
+
+        Args:
+            shown: How many objects are shown one by one, the most probable first.
+        """
+        return self.identity().named(self.memory.names, shown)
 
     def situations(self) -> list[Situation]:
         """Return what the object may be, and where in it the robot may be; improbable ones are left out."""

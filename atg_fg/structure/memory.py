@@ -10,6 +10,7 @@ from atg_fg.errors import InvalidInputError
 from atg_fg.graph import AspectTransitionGraph
 from atg_fg.memory import RobotMemory
 from atg_fg.merging import Merge
+from atg_fg.notebook_views import structured_memory_view
 from atg_fg.parameters import ModelParameters
 from atg_fg.patterns import Detection
 from atg_fg.persistence import one_transaction
@@ -93,6 +94,9 @@ class StructuredMemory(RobotMemory):
         return super().__eq__(other) is True and self.learner.same_as(other.learner)
 
     __hash__ = None
+
+    def _repr_html_(self) -> str:
+        return structured_memory_view(self)._repr_html_()
 
     def __repr__(self) -> str:
         return (
