@@ -32,12 +32,12 @@ import numpy as np
 
 from atg_fg.arcube import ACTION_SOURCES, make_arcubes
 from atg_fg.assumptions import arcube_assumptions
-from atg_fg.atg_picture import draw_atg
 from atg_fg.engines import begin_trial
 from atg_fg.experiments import learn_from
 from atg_fg.figures import GREY, PALETTE, figure_class, plot_style
 from atg_fg.graph import COLLECTION_NODE, AspectTransitionGraph
 from atg_fg.memory import RobotMemory
+from atg_fg.plots import plot_atg
 from atg_fg.policies import make_policy
 from atg_fg.presets import preset
 from atg_fg.store import load_memory, memory_to_json, save_memory
@@ -109,14 +109,18 @@ def explore(world: World, memory: RobotMemory, cube: int, n_actions: int, seed: 
 
 memory = RobotMemory(assumptions)
 record = explore(world, memory, cube=0, n_actions=6, seed=0)
-for time, step in enumerate(record.steps):
-    action = "" if step.action is None else f"then {assumptions.actions[step.action]}"
-    print(f"look {time}: front and top {step.detection} {action}")
+record
+
+# %% [markdown]
+# What was learned from it: a row for each known aspect, and where each action led from there.
 
 # %%
 name = learn_from(record, memory)
 graph = memory[name]
 graph
+
+# %%
+memory
 
 # %% [markdown]
 # ## The ATG, drawn as in Figure 1 of the paper
@@ -126,7 +130,7 @@ graph
 # in an aspect; it is drawn to the collection node, but may lead to an aspect that is known already, too.
 
 # %%
-draw_atg(graph, symbol_images={symbol: tag_image(symbol) for symbol in range(12)})
+plot_atg(graph, symbol_images={symbol: tag_image(symbol) for symbol in range(12)})
 
 # %% [markdown]
 # ## The same as a networkx graph

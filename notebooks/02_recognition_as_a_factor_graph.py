@@ -60,7 +60,7 @@ for cube in range(3):
     rng = np.random.default_rng(cube)
     record = run_trial(ideal, inference, make_policy("random"), 12, rng, reset_options={"object": cube})
     memory.learn(record.patterns, record.actions, matched=None)
-list(memory)
+memory
 
 # %% [markdown]
 # ## One trial in a noisy world
@@ -136,8 +136,10 @@ for name, posterior in posteriors.items():
 # and the last look restores it. One trial, seed 0; the posterior is exact, so there is no interval to give.
 
 # %%
-beliefs = [step.belief for step in record.steps]
-plot_belief(beliefs, memory.names)
+plot_belief(record)
+
+# %%
+inference.belief_table()
 
 # %% [markdown]
 # ## Aspects: filtered and smoothed
@@ -242,6 +244,4 @@ print(f"the straightforward way takes about {straightforward_time / engine_time:
 # Expected entropy is an average over what may be seen; the entropy that follows lies above or below it.
 
 # %%
-expected = [dict(zip(assumptions.actions, step.expected_entropies.tolist(), strict=True)) for step in record.steps[:-1]]
-chosen = [assumptions.actions[action] for action in record.actions]
-plot_entropy([belief.entropy for belief in beliefs], expected, chosen)
+plot_entropy(record)

@@ -5,9 +5,20 @@ import numpy as np
 import pytest
 
 from atg_fg import figures
+from atg_fg.assumptions import arcube_assumptions
+from atg_fg.atg_picture import draw_atg
 from atg_fg.belief import IdentityBelief
+from atg_fg.engines import begin_trial
 from atg_fg.errors import InvalidInputError, MissingDependencyError
-from atg_fg.plots import plot_belief, plot_entropy, plot_success
+from atg_fg.experiments import TestResult
+from atg_fg.graph import AspectTransitionGraph
+from atg_fg.memory import RobotMemory
+from atg_fg.plots import plot_atg, plot_belief, plot_entropy, plot_success
+from atg_fg.policies import make_policy
+from atg_fg.presets import preset
+from atg_fg.trial import run_trial
+from atg_fg.trial_course import course_of
+from atg_fg.worlds import make_world
 
 NAMES = ("cup", "box")
 BELIEFS = [
@@ -94,4 +105,123 @@ def test_without_matplotlib_the_extra_that_brings_it_is_named(monkeypatch):
 )
 def test_nothing_to_draw_is_refused(plot):
     with pytest.raises(InvalidInputError):
+        plot()
+
+
+@pytest.fixture(scope="module")
+def trial():
+    """A record, and the engine at the end of the same trial, of a cube that is remembered."""
+    memory = RobotMemory(arcube_assumptions())
+    with make_world("ideal") as world:
+        for seed, policy in enumerate(("explore", "entropy")):
+            inference = begin_trial("bayes-filter", memory, preset("default"))
+            rng = np.random.default_rng(seed)
+            record = run_trial(world, inference, make_policy(policy), 8, rng, reset_options={"object": 3})
+            if seed == 0:
+                memory.learn(record.patterns, record.actions, None)
+    return record, inference
+
+
+def png(figure):
+    return figure._repr_png_()
+
+
+@pytest.mark.parametrize("plot", [plot_belief, plot_entropy, plot_atg])
+def test_a_record_and_its_engine_give_the_same_picture(plot, trial):
+    record, inference = trial
+    assert png(plot(record)) == png(plot(inference))
+
+
+def test_a_trial_is_drawn_as_its_beliefs_and_entropies_are(trial):
+    record, _ = trial
+    beliefs = [step.belief for step in record.steps]
+    assert png(plot_belief(record)) == png(plot_belief(beliefs, record.names))
+    names = record.assumptions.actions
+    expected = [dict(zip(names, step.expected_entropies, strict=True)) for step in record.steps[:-1]]
+    chosen = [names[action] for action in record.actions]
+    assert png(plot_entropy(record)) == png(plot_entropy([belief.entropy for belief in beliefs], expected, chosen))
+
+
+def test_the_atg_of_a_trial_is_what_it_alone_showed(trial):
+    record, _ = trial
+    graph = AspectTransitionGraph("what the trial showed", record.assumptions)
+    graph.learn(record.patterns, record.actions)
+    last = graph.aspect_showing(record.patterns[-1])
+    assert png(plot_atg(record)) == png(draw_atg(graph, highlight=last))
+    assert png(plot_atg(graph)) == png(draw_atg(graph)) != png(plot_atg(record))
+    assert png(plot_atg(record, highlight=None)) == png(plot_atg(graph))
+
+
+def test_an_engine_with_options_is_gone_through_with_them_once_more(trial):
+    memory = trial[1].memory
+    inference = begin_trial("particle", memory, preset("default"), n_particles=50, seed=3)
+    for number, look in enumerate(trial[1].history.evidence[:3]):
+        inference.observe(look)
+        if number < 2:
+            inference.act(trial[1].history.actions[number])
+    beliefs = course_of(inference).beliefs
+    assert len(beliefs) == 3
+    np.testing.assert_array_equal(beliefs[-1].probabilities, inference.identity().probabilities)
+
+
+def test_an_engine_whose_memory_has_learned_since_is_refused(trial):
+    record, engine = trial
+    memory = engine.memory.copy()
+    inference = begin_trial("bayes-filter", memory, preset("default"))
+    inference.observe(engine.history.evidence[0])
+    memory.learn(record.patterns, record.actions, None)
+    with pytest.raises(InvalidInputError, match="the memory has learned since it began"):
+        plot_belief(inference)
+
+
+TESTS = [TestResult(0, (9, 10), (3, 4), (8, 10)), TestResult(1, (10, 10), (0, 0), (10, 10))]
+
+
+def test_tests_are_drawn_as_scores_with_their_intervals():
+    figure = plot_success(TESTS)
+    # Wilson, by hand: 19 of 20, 3 of 4, 18 of 20.
+    assert [text.get_text() for text in figure.axes[0].texts] == [
+        "95.0 (76.4–99.1)",
+        "75.0 (30.1–95.4)",
+        "90.0 (69.9–97.2)",
+    ]
+    assert [bar.get_width() for bar in figure.axes[0].patches] == pytest.approx([95, 75, 90])
+
+
+def test_named_tests_are_drawn_side_by_side():
+    figure = plot_success({"ours": TESTS, "$theirs$": TESTS[1:]}, title="Compared")
+    axes = figure.axes[0]
+    assert [label.get_text() for label in axes.get_yticklabels()] == ["ours", "$theirs$"]
+    assert [bar.get_width() for bar in axes.patches] == pytest.approx([90, 100])
+    assert axes.get_title(loc="left") == "Compared"
+
+
+@pytest.mark.parametrize(
+    "plot",
+    [
+        lambda: plot_belief(BELIEFS),
+        lambda: plot_success({}),
+        lambda: plot_success({"ours": []}),
+        lambda: plot_success(["a test"]),
+        lambda: plot_atg(begin_trial("gtsam", RobotMemory(arcube_assumptions()), preset("default"))),
+        lambda: plot_entropy(begin_trial("gtsam", RobotMemory(arcube_assumptions()), preset("default"))),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused(plot):
+    with pytest.raises(InvalidInputError, match="expected"):
+        plot()
+
+
+def test_a_trial_has_its_own_expectations(trial):
+    with pytest.raises(InvalidInputError, match="expected, chosen: given with a trial"):
+        plot_entropy(trial[0], [{}], ["flip"])
+
+
+@pytest.mark.parametrize(
+    "plot", [lambda: plot_success(TESTS), lambda: plot_atg(AspectTransitionGraph("new", arcube_assumptions()))]
+)
+def test_every_plot_names_the_extra_where_matplotlib_is_missing(plot, monkeypatch):
+    figures.figure_class.cache_clear()
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    with pytest.raises(MissingDependencyError, match=r"atg-fg\[viz\]"):
         plot()

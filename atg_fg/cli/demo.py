@@ -129,17 +129,8 @@ def _save(folder: Path, world: World, record: TrialRecord, memory: RobotMemory, 
         figures.save_film(picture, world.metadata["render_fps"], folder / "film.gif")
     elif picture is not None:
         figures.save_image(picture, folder / "frame.png")
-    beliefs = [step.belief for step in record.steps]
-    figures.save_figure(plots.plot_belief(beliefs, record.names), folder / "belief.png")
-    actions = record.assumptions.actions
-    expected = [
-        dict(zip(actions, step.expected_entropies.tolist(), strict=True))
-        for step in record.steps
-        if step.expected_entropies is not None
-    ]
-    chosen = [actions[action] for action in record.actions]
-    figure = plots.plot_entropy([belief.entropy for belief in beliefs], expected, chosen)
-    figures.save_figure(figure, folder / "entropy.png")
+    figures.save_figure(plots.plot_belief(record), folder / "belief.png")
+    figures.save_figure(plots.plot_entropy(record), folder / "entropy.png")
     store.write_bytes_atomically(folder / "trial.jsonl", lines.encode())
     learn_from(record, memory)
     store.save_memory(memory, folder / "memory.json")

@@ -79,4 +79,6 @@ def begin_trial(
     check_engine(engine, parameters)
     check_known(ENGINES[engine], engine, options)
     begin: Callable[..., Inference] = ENGINES[engine]
-    return begin(memory, parameters, prior, **options)
+    inference = begin(memory, parameters, prior, **options)
+    inference.options = options
+    return inference
