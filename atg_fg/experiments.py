@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass, field
 from functools import partial
@@ -19,7 +19,8 @@ from atg_fg.errors import InvalidInputError
 from atg_fg.executors import run_pieces, stop_if_asked
 from atg_fg.memory import RobotMemory
 from atg_fg.parameters import ModelParameters
-from atg_fg.policies import make_policy
+from atg_fg.policies import Policy, make_policy
+from atg_fg.result_tables import table_of_tests
 from atg_fg.smoothed_learning import smoothed_patterns
 from atg_fg.statistics import mean, mean_interval, standard_error, wilson_interval
 from atg_fg.store import goes_to_database, make_folder, save_memory
@@ -37,7 +38,7 @@ class TestPlan:
         world: Name of the world.
         world_options: Passed on to the world, such as ``slip``.
         engine: Name of the inference engine.
-        policy: Name of the policy.
+        policy: Name of the policy, or ``module:object`` of a user's own.
         parameters: α, δ and whether to learn within the trial.
         smoothed_learning: Whether the memory learns the patterns that are probable given all evidence of a trial,
             rather than those that were seen whole.
@@ -101,6 +102,9 @@ class TestResult:
     actions: tuple[int, ...] = ()
     merges: tuple[int, int] | None = None
 
+    def _repr_html_(self) -> str:
+        return table_of_tests([self])._repr_html_()
+
 
 def run_test(
     plan: TestPlan,
@@ -109,6 +113,7 @@ def run_test(
     resume: bool = False,
     on_trial: Callable[[int, TrialRecord], None] | None = None,
     memories: Path | None = None,
+    policy: Policy | None = None,
 ) -> TestResult:
     """Run a test from an empty memory and score it.
 
@@ -121,12 +126,16 @@ def run_test(
         resume: Go on after the trials that are already there; the result is the same as of a test in one go.
         on_trial: Called with the number and the record of each trial that is run.
         memories: Folder in which the memory is saved at the end, or a database for the memory of one test.
+        policy: Chooses the actions, and ends trials, in place of what the plan names, such as an ``AgentPolicy``.
 
     Raises:
-        InvalidInputError: The records are of another test, or already there while ``resume`` is false.
+        InvalidInputError: The records are of another test, or already there while ``resume`` is false; or there are
+            records of a policy that the plan does not name.
     """
+    if policy is not None and records is not None:
+        raise InvalidInputError("records: of a policy that the plan does not name; expected none, or its name in it")
     objects_seed, *trial_seeds = np.random.SeedSequence(seed).spawn(1 + plan.n_trials)
-    policy = make_policy(plan.policy, plan.settled)
+    policy = make_policy(plan.policy, plan.settled) if policy is None else policy
     score = Score()
     with closing(plan.make_world(int(objects_seed.generate_state(1)[0]))) as world:
         memory = memory_for(plan.parameters, RobotMemory(assumptions_of(world, plan.n_objects)))
@@ -222,15 +231,19 @@ def learn_from(record: TrialRecord | TrialOutcome, memory: RobotMemory) -> str |
 
 
 class Score:
-    """Counts what is right over the trials of one test, by the truth rather than by the memory."""
+    """Counts what is right over the trials of one test, by the truth rather than by the memory.
 
-    def __init__(self) -> None:
+    Args:
+        made_from: The object that each ATG was made from, by its name, if the memory is not empty at first.
+    """
+
+    def __init__(self, made_from: Mapping[str, object] | None = None) -> None:
         self.n_trials = self.identified = self.recognised = self.judged_known = self.successes = 0
         self.lost = self.undecided = 0
         self._actions: list[int] = []
         self.merges = self.false_merges = 0
-        self._presented: set[object] = set()
-        self._made_from: dict[str, object] = {}
+        self._made_from: dict[str, object] = dict(made_from or {})
+        self._presented: set[object] = set(self._made_from.values())
 
     def add(self, outcome: TrialOutcome, learned: str | None) -> None:
         """Score a trial whose record went to the ATG named ``learned``.

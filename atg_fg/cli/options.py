@@ -40,7 +40,7 @@ PresetsEngine = Annotated[
     str | None, typer.Option(help=f"Inference engine: {', '.join(ENGINES)}. The preset's usual one if not given.")
 ]
 Preset = Annotated[str, typer.Option(help=f"Model parameters: {', '.join(PRESETS)}, or a .json file of your own.")]
-Policy = Annotated[str, typer.Option(help=f"Policy: {', '.join(POLICIES)}.")]
+Policy = Annotated[str, typer.Option(help=f"Policy: {', '.join(POLICIES)}, or module:object of your own.")]
 Settled = Annotated[
     float | None,
     typer.Option(help="End a trial when the entropy of the verdict is at most this, nats; --actions is then the most."),

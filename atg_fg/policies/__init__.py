@@ -7,6 +7,7 @@ from functools import partial
 from typing import Final
 
 from atg_fg.errors import unknown_name
+from atg_fg.policies.agent import AgentPolicy, SampledPolicy, as_policy, imported_policy
 from atg_fg.policies.base import Choice, Policy, best_actions
 from atg_fg.policies.exploration import ExplorationPolicy
 from atg_fg.policies.goal import GoalPolicy
@@ -16,6 +17,7 @@ from atg_fg.policies.stopping import StoppingPolicy, check_settled
 
 __all__ = [
     "POLICIES",
+    "AgentPolicy",
     "Choice",
     "EntropyPolicy",
     "ExplorationPolicy",
@@ -23,7 +25,9 @@ __all__ = [
     "LookaheadPolicy",
     "Policy",
     "RandomPolicy",
+    "SampledPolicy",
     "StoppingPolicy",
+    "as_policy",
     "best_actions",
     "check_settled",
     "make_policy",
@@ -44,14 +48,16 @@ def make_policy(name: str, settled: float | None = None) -> Policy:
     """Return the policy named ``name``.
 
     Args:
-        name: In ``POLICIES``.
+        name: In ``POLICIES``, or ``module:object`` of a user's own: a policy, an agent with ``predict``, or a space of
+            actions.
         settled: Entropy of the verdict in nats at which the policy ends the trial; it never does if not given.
 
     Raises:
         UnknownNameError: There is no such policy.
-        InvalidInputError: ``settled`` is not a finite entropy above 0.
+        InvalidInputError: The user's own cannot be imported, or is no policy; or ``settled`` is not a finite entropy
+            above 0.
     """
-    if name not in POLICIES:
+    if name not in POLICIES and ":" not in name:
         raise unknown_name("policy", name, POLICIES)
-    policy = POLICIES[name]()
+    policy = POLICIES[name]() if name in POLICIES else imported_policy(name)
     return policy if settled is None else StoppingPolicy(policy, settled)

@@ -156,3 +156,15 @@ def test_a_world_takes_options_of_its_own(run, refused):
     assert "expected NAME=VALUE" in refused(*quick, "--world-option", "n_successors")
     assert "n_successors" in refused(*quick, "--world-option", "n_successors=none")
     assert "colour" in refused(*quick, "--world-option", "colour=red")
+
+
+def test_table1_takes_a_policy_of_ones_own(run, refused, tmp_path, monkeypatch):
+    (tmp_path / "own_agent.py").write_text(
+        "class Agent:\n    def predict(self, observation, deterministic):\n        return 1, None\n"
+    )
+    monkeypatch.syspath_prepend(tmp_path)
+    arguments = ["table1", *QUICK, "--tests", "1", "--jobs", "1"]
+    status, output, _ = run(*arguments, "--policy", "own_agent:Agent", "--json", "-")
+    assert status == 0
+    assert json.loads(output)["parameters"]["policy"] == "own_agent:Agent"
+    assert "policy 'own_agent:nobody': own_agent has no 'nobody'" in refused(*arguments, "--policy", "own_agent:nobody")

@@ -1,0 +1,132 @@
+"""Agents of other libraries as policies, and policies of a user's own by name."""
+
+from __future__ import annotations
+
+import importlib
+from typing import Any, ClassVar, Protocol
+
+import gymnasium
+import numpy as np
+
+from atg_fg.belief_summary import BeliefSummary
+from atg_fg.engines.base import Inference
+from atg_fg.errors import InvalidInputError
+from atg_fg.policies.base import Choice, Policy
+
+
+class Agent(Protocol):
+    """What a model of Stable-Baselines3 can do, as far as it is needed here."""
+
+    def predict(self, observation: Any, *, deterministic: bool) -> tuple[Any, Any]:
+        """Return the action for an observation, and a state, which is ``None`` of an agent without one."""
+
+
+class AgentPolicy:
+    """Lets an agent choose, by a summary of the belief; always the action that it thinks best.
+
+    Args:
+        agent: Anything with ``predict(observation, deterministic=True)``, such as a model of Stable-Baselines3 that
+            was trained on a ``RecognitionEnv``. It must keep no state of its own from look to look.
+        summary: What the agent sees; a plain ``BeliefSummary`` of the memory's assumptions if not given.
+
+    Raises:
+        InvalidInputError: The agent has no ``predict``.
+    """
+
+    name: ClassVar[str] = "agent"
+
+    def __init__(self, agent: Agent, summary: BeliefSummary | None = None) -> None:
+        if not callable(getattr(agent, "predict", None)):
+            raise InvalidInputError(f"agent: {agent!r}; expected an object with predict(observation, deterministic)")
+        self.agent, self.summary = agent, summary
+
+    def choose(self, inference: Inference, rng: np.random.Generator) -> Choice:
+        """Return the agent's action.
+
+        Raises:
+            InvalidInputError: The agent expects other observations, keeps a state, or chooses what is no action.
+        """
+        summary = self._summary_for(inference)
+        action, state = self.agent.predict(summary.of(inference), deterministic=True)
+        if state is not None:
+            raise InvalidInputError(f"agent: {self.agent!r} keeps a state; expected one that goes by what it sees")
+        return Choice(_action(action, inference.model.n_actions), None)
+
+    def _summary_for(self, inference: Inference) -> BeliefSummary:
+        summary = self.summary or BeliefSummary(inference.memory.assumptions)
+        expected = getattr(getattr(self.agent, "observation_space", None), "shape", None)
+        if expected is not None and tuple(expected) != summary.space.shape:
+            raise InvalidInputError(
+                f"agent: observations of shape {tuple(expected)}; expected the summary's {summary.space.shape}"
+            )
+        return summary
+
+
+class SampledPolicy:
+    """Takes the actions that a gymnasium space samples, seeded by the trial's generator.
+
+    Args:
+        space: Of the actions, such as ``world.action_space``.
+    """
+
+    name: ClassVar[str] = "sampled"
+
+    def __init__(self, space: gymnasium.Space[Any]) -> None:
+        self.space = space
+
+    def choose(self, inference: Inference, rng: np.random.Generator) -> Choice:
+        """Return a sampled action.
+
+        Raises:
+            InvalidInputError: The space has samples that are no actions.
+        """
+        self.space.seed(int(rng.integers(2**31)))
+        return Choice(_action(self.space.sample(), inference.model.n_actions), None)
+
+
+def as_policy(given: Any, place: str = "policy") -> Policy:
+    """Return a policy, an agent, a space of actions, or a class of one of these, as a policy.
+
+    Raises:
+        InvalidInputError: It is none of these; the message begins with ``place``.
+    """
+    made = given() if isinstance(given, type) else given
+    if callable(getattr(made, "choose", None)):
+        policy: Policy = made
+        return policy
+    if callable(getattr(made, "predict", None)):
+        return AgentPolicy(made)
+    if isinstance(made, gymnasium.Space):
+        return SampledPolicy(made)
+    raise InvalidInputError(
+        f"{place}: {made!r}; expected an object with choose(inference, rng), one with "
+        "predict(observation, deterministic), or a gymnasium space"
+    )
+
+
+def imported_policy(name: str) -> Policy:
+    """Return the policy named ``module:object``.
+
+    Raises:
+        InvalidInputError: There is no such module or object, or it can be no policy.
+    """
+    module, _, attribute = name.partition(":")
+    try:
+        found = importlib.import_module(module)
+    except (ImportError, ValueError) as error:
+        raise InvalidInputError(
+            f"policy {name!r}: cannot be imported: {error}; expected module:object, on Python's path"
+        ) from error
+    for part in attribute.split("."):
+        if not hasattr(found, part):
+            raise InvalidInputError(f"policy {name!r}: {module} has no {attribute!r}; expected module:object")
+        found = getattr(found, part)
+    return as_policy(found, f"policy {name!r}")
+
+
+def _action(value: Any, n_actions: int) -> int:
+    """Return what an agent chose as the index of an action."""
+    array = np.asarray(value)
+    if array.size != 1 or not np.issubdtype(array.dtype, np.integer) or not 0 <= array.item() < n_actions:
+        raise InvalidInputError(f"agent: action {value!r}; expected 0 to {n_actions - 1}")
+    return int(array.item())
