@@ -1,0 +1,100 @@
+"""The Python in the documents runs as it is printed."""
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+import gymnasium
+import pytest
+from gymnasium.utils.env_checker import check_env
+
+from atg_fg import load_memory
+
+DOCS = Path(__file__).parents[1] / "docs"
+
+
+def blocks(name, language="python"):
+    return re.findall(rf"```{language}\n(.*?)```", (DOCS / name).read_text(), re.DOTALL)
+
+
+def run(code, name, variables):
+    exec(compile(code, name, "exec"), variables)
+
+
+def on_the_command_line(command, folder, *shorter):
+    """Run a command as it is printed, with Python's path from the folder; a table is made a shorter one."""
+    program, name, *arguments = shlex.split(command)
+    assert program == "atg-fg"
+    done = subprocess.run(
+        [sys.executable, "-c", "from atg_fg.cli import main; main()", name, *arguments]
+        + (list(shorter) if name == "table1" else []),
+        cwd=folder,
+        env={**os.environ, "PYTHONPATH": f"{folder}{os.pathsep}{DOCS.parent}"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, f"{command}: {done.stderr}"
+
+
+@pytest.fixture
+def cups(tmp_path, monkeypatch):
+    """What the guide to one's own object leaves behind, in its folder."""
+    monkeypatch.chdir(tmp_path)
+    variables = {"__name__": "cups"}
+    yield tmp_path, variables
+    gymnasium.registry.pop("TeaCup-v0", None)
+
+
+def test_the_guide_to_ones_own_object_makes_a_world_in_forty_lines(cups):
+    _, variables = cups
+    world = blocks("bring_your_own_object.md")[0]
+    assert len(world.splitlines()) <= 40
+    run(world, "teacup.py", variables)
+    check_env(variables["TeaCup"](), skip_render_check=True)
+
+
+def test_the_robot_learns_those_objects_recognises_them_and_saves_them(cups, capsys):
+    folder, variables = cups
+    for code in blocks("bring_your_own_object.md"):
+        run(code, "guide", variables)
+    remembered = int(re.search(r"# RobotMemory\((\d+) of 12", code)[1])
+    assert f"RobotMemory({remembered} of 12 objects)" in capsys.readouterr().out
+    assert len(load_memory(folder / "cups.json")) == remembered
+    last = variables["record"]
+    assert last.verdict == "known"
+
+
+def test_the_commands_take_the_world_from_a_file(cups):
+    folder, _ = cups
+    (folder / "teacup.py").write_text(blocks("bring_your_own_object.md")[0])
+    _, *commands = blocks("bring_your_own_object.md", "sh")[0].splitlines()
+    assert len(commands) == 3
+    for command in commands:
+        on_the_command_line(command, folder, "--tests", "1", "--trials", "5", "--jobs", "1")
+    assert load_memory(folder / "cups.json").assumptions.actions == ("turn", "invert")
+
+
+def test_the_loops_of_the_document_on_agents_run(capsys):
+    task, _, agent = blocks("agents.md")
+    run(task, "agents.md", variables := {})
+    assert capsys.readouterr().out.split()[1] in ("novel", "known")
+    variables["task"].close()
+    run(agent, "agents.md", variables := {})
+    assert "judged known, object-003" in capsys.readouterr().out
+    assert variables["agent"].trials == []
+
+
+@pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::FutureWarning", "ignore::UserWarning")
+def test_an_agent_of_stable_baselines3_is_trained_and_scored(tmp_path, monkeypatch, capsys):
+    pytest.importorskip("stable_baselines3", reason="Stable-Baselines3 is not installed: pip install atg-fg[agents]")
+    monkeypatch.chdir(tmp_path)
+    task, agent, _ = blocks("agents.md")
+    run(task + agent, "agents.md", {})
+    assert "TestResult(seed=0" in capsys.readouterr().out
+    module, command = blocks("agents.md", "sh")[0].splitlines()
+    (tmp_path / "my_agent.py").write_text(module.split("'")[1].replace("\\n", "\n"))
+    on_the_command_line(command.removeprefix("PYTHONPATH=. "), tmp_path, "--tests", "1", "--trials", "3", "--jobs", "1")
