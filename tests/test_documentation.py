@@ -49,6 +49,18 @@ def cups(tmp_path, monkeypatch):
     gymnasium.registry.pop("TeaCup-v0", None)
 
 
+def test_every_page_is_in_the_table_of_contents():
+    listed = set(re.findall(r"^(\w+)$", (DOCS / "index.md").read_text(), flags=re.MULTILINE))
+    assert {page.stem for page in DOCS.glob("*.md")} - {"index"} <= listed
+
+
+def test_the_first_trial_runs_from_top_to_bottom(capsys):
+    variables = {}
+    for code in blocks("first_trial.md"):
+        run(code, "first_trial.md", variables)
+    assert "RobotMemory(" in capsys.readouterr().out
+
+
 def test_the_guide_to_ones_own_object_makes_a_world_in_forty_lines(cups):
     _, variables = cups
     world = blocks("bring_your_own_object.md")[0]
