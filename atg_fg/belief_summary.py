@@ -12,9 +12,7 @@ from atg_fg.assumptions import Assumptions
 from atg_fg.engines.base import Inference
 from atg_fg.errors import InvalidInputError
 from atg_fg.patterns import FloatArray
-
-#: Expected gains below this are none, in nats.
-TIE_TOLERANCE: Final = 1e-9
+from atg_fg.ties import TIE_TOLERANCE
 
 #: Remembered objects whose probabilities are given one by one.
 TOP: Final = 5

@@ -18,8 +18,9 @@ from atg_fg.errors import InvalidInputError, TooLargeError
 from atg_fg.memory import RobotMemory
 from atg_fg.parameters import ModelParameters
 from atg_fg.patterns import Evidence, FloatArray
-from atg_fg.policies import RandomPolicy, best_actions
+from atg_fg.policies import RandomPolicy
 from atg_fg.statistics import wilson_interval
+from atg_fg.ties import best_actions
 from atg_fg.trial import run_trial
 from atg_fg.worlds import detection_of, make_world
 

@@ -23,7 +23,7 @@ from atg_fg.memory import RobotMemory
 from atg_fg.model import COLLECTION
 from atg_fg.parameters import ModelParameters
 from atg_fg.patterns import Evidence
-from atg_fg.policies import best_actions
+from atg_fg.ties import best_actions
 
 SCRIPT_FORMAT: Final = "atg-fg/scripted-trial"
 _KEYS = ("format", "version", "assumptions", "parameters", "memory", "steps")

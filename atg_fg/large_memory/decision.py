@@ -12,7 +12,7 @@ from atg_fg.belief import x_log_x
 from atg_fg.large_memory.aspect_filter import AspectFilter
 from atg_fg.large_memory.never_matched import ClassMasses, NeverMatched
 from atg_fg.patterns import FloatArray, IntArray
-from atg_fg.policies.base import TIE_TOLERANCE, best_actions
+from atg_fg.ties import TIE_TOLERANCE, best_actions
 
 #: Of an object one by one, aspects with no more of its mass than this are taken together if that is allowed; and so are
 #: all aspects of an object that is less probable than ``NEGLIGIBLE``.

@@ -8,7 +8,7 @@ from typing import Final
 
 from atg_fg.errors import unknown_name
 from atg_fg.policies.agent import AgentPolicy, SampledPolicy, as_policy, imported_policy
-from atg_fg.policies.base import Choice, Policy, best_actions
+from atg_fg.policies.base import Choice, Policy
 from atg_fg.policies.exploration import ExplorationPolicy
 from atg_fg.policies.goal import GoalPolicy
 from atg_fg.policies.lookahead import LookaheadPolicy
@@ -28,7 +28,6 @@ __all__ = [
     "SampledPolicy",
     "StoppingPolicy",
     "as_policy",
-    "best_actions",
     "check_settled",
     "make_policy",
 ]

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Final, NamedTuple, Protocol
+from typing import ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
 from atg_fg.engines.base import Inference
 from atg_fg.patterns import FloatArray
-
-#: Costs or expected entropies closer than this are a tie.
-TIE_TOLERANCE: Final = 1e-9
+from atg_fg.ties import best_actions
 
 
 class Choice(NamedTuple):
@@ -35,13 +33,6 @@ class Policy(Protocol):
 
     def choose(self, inference: Inference, rng: np.random.Generator) -> Choice:
         """Return the next action."""
-
-
-def best_actions(costs: FloatArray) -> list[int]:
-    """Return all actions whose cost, such as the expected entropy, is the least, up to ``TIE_TOLERANCE``."""
-    values = costs.tolist()
-    least = min(values) + TIE_TOLERANCE
-    return [action for action, value in enumerate(values) if value <= least]
 
 
 def one_of_the_best(costs: FloatArray, rng: np.random.Generator) -> int:

@@ -18,7 +18,7 @@ from atg_fg.errors import ImpossibleEvidenceError, InvalidInputError, TooLargeEr
 from atg_fg.large_memory import tables_on_demand
 from atg_fg.memory import RobotMemory
 from atg_fg.parameters import ModelParameters
-from atg_fg.policies import best_actions
+from atg_fg.ties import best_actions
 from tests.models import Case, Look, cases, random_case
 from tests.oracle import Atg
 from tests.small import graph, one_slot, seen

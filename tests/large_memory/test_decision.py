@@ -39,7 +39,7 @@ def test_no_two_joint_distributions_differ_more_in_conditional_entropy(seed, sha
     data=st.data(),
 )
 def test_what_is_decided_is_the_same_for_all_values_within_the_bound(entropies, bound, data):
-    from atg_fg.policies import best_actions
+    from atg_fg.ties import best_actions
 
     expected = np.array(entropies)
     if is_decided(expected, bound):

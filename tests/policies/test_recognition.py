@@ -7,8 +7,9 @@ from atg_fg.engines import begin_trial
 from atg_fg.errors import UnknownNameError
 from atg_fg.memory import RobotMemory
 from atg_fg.patterns import Evidence
-from atg_fg.policies import EntropyPolicy, RandomPolicy, best_actions, make_policy
+from atg_fg.policies import EntropyPolicy, RandomPolicy, make_policy
 from atg_fg.presets import preset
+from atg_fg.ties import best_actions
 
 
 def looking_at(cube_number, *, remembered):
