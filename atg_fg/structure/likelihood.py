@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -82,6 +83,8 @@ def follow(own: PoseFilter, trials: TrialArrays, alphabet: PatternAlphabet) -> N
             own.observe_likelihood(agrees.all(axis=2).astype(np.float64))
 
 
+# A memory that is read again, as after another process has written, has mostly the same trials.
+@lru_cache(maxsize=4096)
 def plain_log_evidence(trial: RawTrial, assumptions: Assumptions) -> float:
     """Return ln p(trial) for an object never met that follows no structure: a plain ATG, learned as the trial goes."""
     evidence = [Evidence.of_detection(assumptions.alphabet, detection) for detection in trial.detections]
