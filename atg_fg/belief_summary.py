@@ -12,10 +12,11 @@ from atg_fg.assumptions import Assumptions
 from atg_fg.engines.base import Inference
 from atg_fg.errors import InvalidInputError
 from atg_fg.patterns import FloatArray
-from atg_fg.ties import TIE_TOLERANCE
 
 #: Remembered objects whose probabilities are given one by one.
 TOP: Final = 5
+#: Expected gains up to this are none, in nats.
+_NO_GAIN: Final = 1e-9
 
 
 class BeliefSummary:
@@ -90,7 +91,7 @@ class BeliefSummary:
         if not self.expected_entropies:
             return np.empty(0)
         gains = (entropy - inference.expected_entropies()).clip(0.0)
-        return gains / gains.max() if gains.max() > TIE_TOLERANCE else np.zeros_like(gains)
+        return gains / gains.max() if gains.max() > _NO_GAIN else np.zeros_like(gains)
 
     def _symbols(self, inference: Inference) -> FloatArray:
         """Return the probability of each symbol in each slot by the last look alone, shape [slots · symbols]."""

@@ -47,7 +47,7 @@ def memory_view(memory: RobotMemory, more: str = "") -> HtmlTable:
     assumptions = memory.assumptions
     rows: list[tuple[Cell, ...]] = []
     # The last ones are not looked at: a memory may hold very many.
-    for graph, _ in zip(memory, range(_OBJECTS), strict=False):
+    for _, graph in zip(range(_OBJECTS), memory, strict=False):
         aspects = Bar(graph.n_known / assumptions.n_aspects, f"{graph.n_known} of {assumptions.n_aspects}")
         rows.append((graph.name, aspects, str(len(graph.counts)), str(sum(graph.counts.values()))))
     if len(memory) > len(rows):

@@ -1,4 +1,4 @@
-"""The Python in the documents runs as it is printed."""
+"""The guides to objects, agents and loops of one's own: their Python and their commands run as they are printed."""
 
 import os
 import re
