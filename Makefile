@@ -30,7 +30,7 @@ test: $(READY)  ## Run the tests
 test-all: $(READY)  ## Run the tests, slow ones too
 	$(BIN)/python -m pytest -n auto --dist loadfile -m ''
 
-torture: $(READY)  ## Kill writers, fill disks, damage files, and look at what is left (half an hour on 2 cores)
+torture: $(READY)  ## Kill writers, fill disks, damage files, and look at what is left (some ten minutes on 2 cores)
 	$(BIN)/python -m tests.torture --kills 1000 --files 20000
 
 lint: $(READY)  ## Check style and types
