@@ -20,9 +20,9 @@ class CodeLinks(SphinxPostTransform):
 
     def run(self, **kwargs: Any) -> None:
         """Go through one page."""
-        targets = _targets(self.env)
         if self.env.docname.startswith("api/"):
             return
+        targets = _targets(self.env)
         for literal in list(self.document.findall(nodes.literal)):
             found = targets.get(literal.astext(), ())
             if len(found) != 1 or isinstance(literal.parent, nodes.reference):
