@@ -56,6 +56,14 @@ def _escaped(found: re.Match[str]) -> str:
     return "\\|" if text == "|" else text[:-1] + "\\_"
 
 
+def _only_this_branch(app: Any, page: str, template: str, context: dict[str, Any], document: Any) -> None:
+    """Unfold the table of contents in the margin where the page is; all of it on each of 500 pages takes minutes."""
+    table = context.get("toctree")
+    if table is not None:
+        context["toctree"] = lambda **options: table(**{**options, "collapse": True})
+
+
 def setup(app: Any) -> None:
     """Add what is of this site alone."""
     app.connect("autodoc-process-docstring", _plain_docstring, priority=100)
+    app.connect("html-page-context", _only_this_branch, priority=100)
