@@ -23,12 +23,14 @@ LOGGED = {"figure3": FIGURE3, "ablation": ABLATION}
 
 
 def begin(*arguments):
-    """Begin the command in a process group of its own, as a terminal does."""
+    """Begin the command in a process group of its own, as a terminal does, which leaves SIGINT to it."""
     code = "from atg_fg.cli import main; main()"
     environment = {**os.environ, "PYTHONPATH": str(ROOT)}
     return subprocess.Popen(
         [sys.executable, "-c", code, *map(str, arguments)],
         env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True,
+        # Whoever runs the tests in the background may have told them to ignore it, and children inherit that.
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     )  # fmt: skip
 
 
