@@ -1,8 +1,10 @@
 """What ``atg-fg watch --save`` leaves can be read back, and holds what was promised."""
 
 import importlib.util
+import re
 import subprocess
 import sys
+from collections import Counter
 
 import numpy as np
 import pytest
@@ -27,10 +29,11 @@ def said(*arguments):
 
 
 def rows_of(path):
-    """Return, for each entity of a recording, in how many chunks it is."""
-    lines = said("stats", path).split("Num chunks per entity")[1].splitlines()
-    found = (line.rsplit(": ", 1) for line in lines if line.startswith("/") and ": " in line)
-    return {name: int(number) for name, number in found}
+    """Return, for each entity of a recording, how many rows it has in all; how many chunks they are in is by chance."""
+    rows = Counter()
+    for number, name in re.findall(r"with ([\d ]+) rows \([^)]*\) - (/\S*)", said("print", path)):
+        rows[name] += int(number.replace(" ", ""))
+    return rows
 
 
 @needs_rerun
