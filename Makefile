@@ -33,10 +33,11 @@ test-all: $(READY)  ## Run the tests, slow ones too
 torture: $(READY)  ## Kill writers, fill disks, damage files, and look at what is left (some ten minutes on 2 cores)
 	$(BIN)/python -m tests.torture --kills 1000 --files 20000
 
-lint: $(READY)  ## Check style and types
+lint: $(READY)  ## Check style, types, and that packages import only what stands on lower floors
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
+	$(BIN)/lint-imports
 
 format: $(READY)  ## Mend style
 	$(BIN)/ruff check --fix .
@@ -87,7 +88,7 @@ results-robot: $(READY)  ## Run the experiments on the simulated robot (about an
 				--json results/table1_robonaut_$${condition}_$$preset.json || exit; \
 		done; \
 	done
-	$(BIN)/atg-fg sim calibrate results/reliability_worn.json --output atg_fg/data/robot.json
+	$(BIN)/atg-fg sim calibrate results/reliability_worn.json --output atg_fg/storage/data/robot.json
 	for preset in default robot; do \
 		$(BIN)/atg-fg table1 --slip 0.038 --missing 0.032 --preset $$preset --tests 20 --engine bayes-filter \
 			--json results/table1_noisy_$$preset.json || exit; \

@@ -19,14 +19,15 @@ from numpy.typing import NDArray
 from rich.console import Console
 from rich.table import Table
 
-from atg_fg.arcube import ACTION_SOURCES
-from atg_fg.assumptions import arcube_assumptions
-from atg_fg.belief_summary import TOP, BeliefSummary
-from atg_fg.experiments import TestPlan, TestResult, pooled_interval, run_test
+from atg_fg.core.assumptions import arcube_assumptions
+from atg_fg.core.statistics import standard_error
+from atg_fg.experiments.recognition_env import make_recognition_env
+from atg_fg.experiments.scores import TestResult, pooled_interval
+from atg_fg.experiments.table1 import TestPlan, run_test
 from atg_fg.policies import AgentPolicy, Policy, make_policy
-from atg_fg.presets import preset
-from atg_fg.recognition_env import make_recognition_env
-from atg_fg.statistics import standard_error
+from atg_fg.policies.belief_features import TOP, BeliefSummary
+from atg_fg.storage.presets import preset
+from atg_fg.worlds.arcube import ACTION_SOURCES
 
 N_ACTIONS = 6
 OBJECTS_SEED = 1000

@@ -12,9 +12,9 @@ import rich.markup
 import rich.table
 import typer
 
-from atg_fg import store
 from atg_fg.cli import options
-from atg_fg.errors import InvalidInputError
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.storage import plain_files
 from benchmarks import report
 from benchmarks.tables import Table, machine_line, tables
 
@@ -50,7 +50,7 @@ def bench(
     if markdown is not None and page is not None:
         before, after = page
         text = f"{before}{BEGIN}\n\n{machine_line(document)}\n\n{_markdown(made)}\n{END}{after}"
-        store.write_bytes_atomically(markdown, text.encode())
+        plain_files.write_bytes_atomically(markdown, text.encode())
     if json_file != "-":
         console = options.console()
         console.print(machine_line(document), markup=False)
@@ -81,7 +81,7 @@ def _measured(plan: report.Plan) -> dict[str, Any]:
 def _read(path: Path) -> dict[str, Any]:
     """Return the document of an earlier run."""
     try:
-        document = json.loads(store.read_text_file(path))
+        document = json.loads(plain_files.read_text_file(path))
     except ValueError as error:
         raise InvalidInputError(f"{path}: not JSON: {error}") from error
     version = (document.get("format"), document.get("version")) if isinstance(document, dict) else (None, None)
@@ -101,8 +101,8 @@ def _tables(document: dict[str, Any], given: Path | None) -> list[Table]:
 
 def _page(path: Path) -> tuple[str, str]:
     """Return what stands before and after the tables of a page, before any work is done."""
-    store.check_writable(path)
-    text = store.read_text_file(path)
+    plain_files.check_writable(path)
+    text = plain_files.read_text_file(path)
     before, begin, rest = text.partition(BEGIN)
     _, end, after = rest.partition(END)
     if not begin or not end:

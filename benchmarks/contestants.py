@@ -8,13 +8,13 @@ from typing import Any, Final
 
 import numpy as np
 
+from atg_fg.core.compact.compact_memory import CompactMemory
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.patterns import Evidence, FloatArray
 from atg_fg.engines import ENGINES, begin_trial
-from atg_fg.engines.base import Inference
 from atg_fg.engines.gtsam_elimination import GtsamElimination
-from atg_fg.large_memory.compact_memory import CompactMemory
-from atg_fg.memory import RobotMemory
-from atg_fg.patterns import Evidence, FloatArray
-from atg_fg.presets import preset
+from atg_fg.inference.interface import Inference
+from atg_fg.storage.presets import preset
 from benchmarks.measuring import Clock, Sample
 from benchmarks.memories import Course
 

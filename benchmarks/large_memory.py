@@ -18,16 +18,16 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from atg_fg.arcube import ACTION_SOURCES
-from atg_fg.assumptions import Assumptions
-from atg_fg.comparison import total_variation
+from atg_fg.core.assumptions import Assumptions
+from atg_fg.core.compact.compact_memory import CompactMemory, GraphArrays, compacted
+from atg_fg.core.patterns import Evidence, FloatArray, IntArray, PatternAlphabet
 from atg_fg.engines import begin_trial
-from atg_fg.engines.base import Inference
-from atg_fg.engines.large_memory import LargeMemory
-from atg_fg.large_memory.compact_memory import CompactMemory, GraphArrays, compacted
-from atg_fg.large_memory.files import load_compact_memory, save_compact_memory
-from atg_fg.patterns import Evidence, FloatArray, IntArray, PatternAlphabet
-from atg_fg.presets import preset
+from atg_fg.engines.large_memory.engine import LargeMemory
+from atg_fg.experiments.engine_comparison import total_variation
+from atg_fg.inference.interface import Inference
+from atg_fg.storage.compact_file import load_compact_memory, save_compact_memory
+from atg_fg.storage.presets import preset
+from atg_fg.worlds.arcube import ACTION_SOURCES
 
 SIZES = (100, 1_000, 10_000, 100_000)
 N_WALK = 13

@@ -17,14 +17,16 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from atg_fg.core.patterns import Evidence
+from atg_fg.core.statistics import standard_error
 from atg_fg.engines import begin_trial
-from atg_fg.engines.base import Inference
-from atg_fg.experiments import TestPlan, pooled_interval, run_test
-from atg_fg.patterns import Evidence
+from atg_fg.experiments.scores import pooled_interval
+from atg_fg.experiments.table1 import TestPlan, run_test
+from atg_fg.inference.interface import Inference
 from atg_fg.policies import make_policy
-from atg_fg.presets import preset
-from atg_fg.statistics import standard_error
-from atg_fg.worlds import detection_of, make_world
+from atg_fg.storage.presets import preset
+from atg_fg.worlds.base import detection_of
+from atg_fg.worlds.registry import make_world
 from benchmarks.memories import remembered
 
 POLICIES = ("entropy", "lookahead-2", "lookahead-3")

@@ -9,11 +9,11 @@ from typing import Final
 
 import numpy as np
 
-from atg_fg.arcube import ORIENTATIONS, SUCCESSORS, Cube, canonical, make_arcubes, shown_pattern
-from atg_fg.assumptions import Assumptions, arcube_assumptions
-from atg_fg.memory import RobotMemory
-from atg_fg.patterns import Evidence
-from atg_fg.structure.memory import StructuredMemory
+from atg_fg.core.assumptions import Assumptions, arcube_assumptions
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.patterns import Evidence
+from atg_fg.learning.structured_memory import StructuredMemory
+from atg_fg.worlds.arcube import ORIENTATIONS, SUCCESSORS, Cube, canonical, make_arcubes, shown_pattern
 
 #: Actions that each object was turned by when it was learned; it then knows about 10 aspects.
 N_LEARNING_ACTIONS: Final = 13

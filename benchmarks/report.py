@@ -7,8 +7,9 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from typing import Any, Final
 
-from benchmarks import matches, table1
-from benchmarks.floor import floor
+from benchmarks import matching_cost as matches
+from benchmarks import table1
+from benchmarks.lower_bound import floor
 from benchmarks.machine import description
 from benchmarks.measuring import Clock
 from benchmarks.targets import TARGETS

@@ -16,8 +16,8 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
-from sim.robot.controller import TIME_STEP
-from sim.robot.world import RobonautARcubeWorld
+from sim.manipulation.impedance_control import TIME_STEP
+from sim.worlds.robonaut_world import RobonautARcubeWorld
 
 ROUNDS = 7
 N_STEPS = 1200

@@ -19,10 +19,10 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
-from atg_fg.assumptions import arcube_assumptions
-from atg_fg.experiments import TestPlan, run_test
-from atg_fg.patterns import Evidence
-from atg_fg.trial_log import read_trials
+from atg_fg.core.assumptions import arcube_assumptions
+from atg_fg.core.patterns import Evidence
+from atg_fg.experiments.table1 import TestPlan, run_test
+from atg_fg.storage.trial_log import read_trials
 
 PLAN = TestPlan(engine="bayes-filter", world_options={"missing": 0.1})
 MEASURES = (

@@ -11,7 +11,8 @@ import sys
 from rich.console import Console
 from rich.table import Table
 
-from atg_fg.experiments import TestPlan, actions_a_trial, pooled_interval, run_test, summarise
+from atg_fg.experiments.scores import actions_a_trial, pooled_interval, summarise
+from atg_fg.experiments.table1 import TestPlan, run_test
 
 MOST = 20
 THRESHOLDS = (0.3, 0.1, 0.03, 0.01)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import ceil
 from typing import Any, Final
 
-from atg_fg.experiments import TestPlan, run_tests
+from atg_fg.experiments.table1 import TestPlan, run_tests
 from benchmarks.measuring import Clock, Sample, alternate, ratios, spread
 
 #: Tests of the paper's Table 1.

@@ -7,10 +7,10 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Final
 
+from atg_fg.core.errors import AtgError
+from atg_fg.core.memory import RobotMemory
 from atg_fg.engines import ENGINES
-from atg_fg.errors import AtgError
-from atg_fg.memory import RobotMemory
-from atg_fg.presets import preset
+from atg_fg.storage.presets import preset
 from benchmarks.contestants import (
     LARGE_MEMORY,
     REFERENCE,
@@ -21,7 +21,7 @@ from benchmarks.contestants import (
     follow,
     large_memory,
 )
-from benchmarks.dense_model import dense_model, table_bytes
+from benchmarks.dense_tables import dense_model, table_bytes
 from benchmarks.measuring import Clock, Sample, alternate, median_of, ratios, repeats_for, spread
 from benchmarks.memories import Course, course_for, remembered, with_learned_structure
 from benchmarks.peers import PEERS, PRESET, make_peer

@@ -30,19 +30,21 @@ from pathlib import Path
 
 import numpy as np
 
-from atg_fg.arcube import ACTION_SOURCES, make_arcubes
-from atg_fg.assumptions import arcube_assumptions
+from atg_fg.core.aspect_graph import COLLECTION_NODE, AspectTransitionGraph
+from atg_fg.core.assumptions import arcube_assumptions
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.records import TrialRecord
+from atg_fg.display.figures import GREY, PALETTE, figure_class, plot_style
+from atg_fg.display.trial_plots import plot_atg
 from atg_fg.engines import begin_trial
-from atg_fg.experiments import learn_from
-from atg_fg.figures import GREY, PALETTE, figure_class, plot_style
-from atg_fg.graph import COLLECTION_NODE, AspectTransitionGraph
-from atg_fg.memory import RobotMemory
-from atg_fg.plots import plot_atg
+from atg_fg.experiments.trial import learn_from, run_trial
 from atg_fg.policies import make_policy
-from atg_fg.presets import preset
-from atg_fg.store import load_memory, memory_to_json, save_memory
-from atg_fg.trial import TrialRecord, run_trial
-from atg_fg.worlds import World, make_world
+from atg_fg.storage.memory_files import load_memory, save_memory
+from atg_fg.storage.memory_json import memory_to_json
+from atg_fg.storage.presets import preset
+from atg_fg.worlds.arcube import ACTION_SOURCES, make_arcubes
+from atg_fg.worlds.base import World
+from atg_fg.worlds.registry import make_world
 
 # %% [markdown]
 # ## An ARcube
@@ -57,8 +59,8 @@ cubes = make_arcubes(100, seed=0)
 camera_world = make_world("rendered", cubes=cubes).unwrapped
 
 # After the world, which imports the simulator without its banner.
-from sim.cube_body import tag_image
-from sim.detection import draw_detections
+from sim.bodies.cube import tag_image
+from sim.vision.tag_detection import draw_detections
 
 
 def seen_after(action: str | None) -> np.ndarray:

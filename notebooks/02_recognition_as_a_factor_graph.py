@@ -31,17 +31,17 @@ import time
 
 import numpy as np
 
-from atg_fg.assumptions import arcube_assumptions
+from atg_fg.core.assumptions import arcube_assumptions
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.patterns import Evidence
+from atg_fg.display.figures import PALETTE, figure_class, plot_style
+from atg_fg.display.trial_plots import plot_belief, plot_entropy
 from atg_fg.engines import begin_trial
-from atg_fg.factors import object_key
-from atg_fg.figures import PALETTE, figure_class, plot_style
-from atg_fg.memory import RobotMemory
-from atg_fg.parameters import ModelParameters
-from atg_fg.patterns import Evidence
-from atg_fg.plots import plot_belief, plot_entropy
+from atg_fg.experiments.trial import run_trial
+from atg_fg.inference.gtsam_factors import object_key
 from atg_fg.policies import make_policy
-from atg_fg.trial import run_trial
-from atg_fg.worlds import make_world
+from atg_fg.worlds.registry import make_world
 
 # %% [markdown]
 # ## Three look-alikes and a small memory

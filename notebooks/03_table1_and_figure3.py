@@ -29,18 +29,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from atg_fg.assumptions import arcube_assumptions
+from atg_fg.core.aspect_graph import AspectTransitionGraph
+from atg_fg.core.assumptions import arcube_assumptions
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.patterns import Evidence
+from atg_fg.core.records import TrialRecord
+from atg_fg.display.figures import GREY, PALETTE, figure_class, plot_style
+from atg_fg.display.success_plots import plot_success
 from atg_fg.engines import begin_trial
-from atg_fg.experiments import TestPlan, TestResult, pooled_interval, run_test, run_tests, summarise
-from atg_fg.figure3 import figure3_points
-from atg_fg.figures import GREY, PALETTE, figure_class, plot_style
-from atg_fg.graph import AspectTransitionGraph
-from atg_fg.memory import RobotMemory
-from atg_fg.parameters import ModelParameters
-from atg_fg.patterns import Evidence
-from atg_fg.plots import plot_success
-from atg_fg.presets import preset
-from atg_fg.trial import TrialRecord
+from atg_fg.experiments.figure3 import figure3_points
+from atg_fg.experiments.scores import TestResult, pooled_interval, summarise
+from atg_fg.experiments.table1 import TestPlan, run_test, run_tests
+from atg_fg.storage.presets import preset
 
 # %% [markdown]
 # ## Table 1

@@ -24,13 +24,14 @@
 # %%
 import numpy as np
 
-from atg_fg.arcube import make_arcubes
-from atg_fg.comparison import ComparisonPlan, compare, learned_memory, summarise, total_variation
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.patterns import Evidence
+from atg_fg.display.figures import GREY, PALETTE, figure_class, plot_style
 from atg_fg.engines import ENGINES, begin_trial
-from atg_fg.figures import GREY, PALETTE, figure_class, plot_style
-from atg_fg.parameters import ModelParameters
-from atg_fg.patterns import Evidence
-from atg_fg.worlds import detection_of, make_world
+from atg_fg.experiments.engine_comparison import ComparisonPlan, compare, learned_memory, summarise, total_variation
+from atg_fg.worlds.arcube import make_arcubes
+from atg_fg.worlds.base import detection_of
+from atg_fg.worlds.registry import make_world
 
 # %% [markdown]
 # ## The trials

@@ -23,13 +23,13 @@
 # %%
 import numpy as np
 
-from atg_fg.comparison import ComparisonPlan, learned_memory
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.patterns import Evidence
+from atg_fg.display.figures import GREY, PALETTE, figure_class, plot_style
 from atg_fg.engines import begin_trial
-from atg_fg.explanations import best_explanations, sample_explanations, surprise
-from atg_fg.figures import GREY, PALETTE, figure_class, plot_style
-from atg_fg.parameters import ModelParameters
-from atg_fg.patterns import Evidence
-from atg_fg.smoothed_learning import pattern_marginals, smoothed_patterns
+from atg_fg.experiments.engine_comparison import ComparisonPlan, learned_memory
+from atg_fg.inference.explanations import best_explanations, sample_explanations, surprise
+from atg_fg.inference.smoothing import pattern_marginals, smoothed_patterns
 
 # %% [markdown]
 # ## A trial with a wrong look and a missing one

@@ -28,15 +28,15 @@ from pathlib import Path
 import numpy as np
 
 from atg_fg import TestPlan, arcube_assumptions, preset, run_test
-from atg_fg.arcube import make_arcubes
-from atg_fg.figures import GREY, PALETTE, figure_class, plot_style
-from atg_fg.memory_learning import learned_memory
-from atg_fg.plots import plot_ablation
+from atg_fg.display.completed_picture import draw_completed_atg
+from atg_fg.display.figures import GREY, PALETTE, figure_class, plot_style
+from atg_fg.display.structure_picture import draw_structure
+from atg_fg.display.structure_words import action_text, register_names
+from atg_fg.display.success_plots import plot_ablation
+from atg_fg.experiments.exploration import learned_memory
+from atg_fg.learning.completion import completed_atg, statuses
 from atg_fg.policies import RandomPolicy
-from atg_fg.structure.completed_picture import draw_completed_atg
-from atg_fg.structure.completion import completed_atg, statuses
-from atg_fg.structure.structure_picture import draw_structure
-from atg_fg.structure.words import action_text, register_names
+from atg_fg.worlds.arcube import make_arcubes
 
 assumptions = arcube_assumptions()
 cubes = make_arcubes(8, seed=0)

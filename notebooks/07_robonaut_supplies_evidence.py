@@ -27,30 +27,31 @@
 import numpy as np
 from matplotlib.figure import Figure
 
-from atg_fg.arcube import ACTION_SOURCES, N_TAGS, make_arcubes
-from atg_fg.assumptions import arcube_assumptions
+from atg_fg.core.assumptions import arcube_assumptions
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.statistics import wilson_interval
+from atg_fg.display.figures import GREY, INK, PALETTE, figure_class, plot_style
+from atg_fg.display.trial_plots import plot_belief
 from atg_fg.engines import begin_trial
-from atg_fg.figures import GREY, INK, PALETTE, figure_class, plot_style
-from atg_fg.memory import RobotMemory
-from atg_fg.plots import plot_belief
+from atg_fg.experiments.trial import run_trial
 from atg_fg.policies import make_policy
-from atg_fg.presets import preset
-from atg_fg.statistics import wilson_interval
-from atg_fg.trial import run_trial
-from atg_fg.worlds import MISSING, make_world
+from atg_fg.storage.presets import preset
+from atg_fg.worlds.arcube import ACTION_SOURCES, N_TAGS, make_arcubes
+from atg_fg.worlds.base import MISSING
+from atg_fg.worlds.registry import make_world
 
 cubes = make_arcubes(4, seed=0)
 world = make_world("robonaut", cubes=cubes, condition="nominal", render_mode="rgb_array")
 
 # After the world, which imports the simulator without its banner.
-from sim.camera import Camera
-from sim.detection import draw_detections
-from sim.robot.body import HOME_POSTURE
-from sim.robot.calibration import Counts, calibrate
-from sim.robot.conditions import condition_named
-from sim.robot.film import observed
-from sim.robot.plans import GRIP_FORCE
-from sim.robot.reliability import run_actions, summarise
+from sim.bodies.robot import HOME_POSTURE
+from sim.manipulation.waypoints import GRIP_FORCE
+from sim.noise_calibration import Counts, calibrate
+from sim.reliability import run_actions, summarise
+from sim.vision.camera import Camera
+from sim.vision.tag_detection import draw_detections
+from sim.worlds.domain_randomization import condition_named
+from sim.worlds.film import observed
 
 robot = world.unwrapped
 

@@ -26,22 +26,23 @@ from dataclasses import replace
 import numpy as np
 
 from atg_fg import begin_trial, preset
-from atg_fg.all_different import different_identities
-from atg_fg.arcube import make_arcubes, shown_pattern
-from atg_fg.assumptions import arcube_assumptions
-from atg_fg.atg_picture import draw_atg
-from atg_fg.figures import PALETTE, figure_class, plot_style
-from atg_fg.goal_experiment import COMPLETE, GoalPlan, run_many
-from atg_fg.goal_planning import nearest_aspect, reachable_aspects, shortest_path, transitions_of_graph
-from atg_fg.goal_scoring import summarise
-from atg_fg.goals import Goal
-from atg_fg.graph import AspectTransitionGraph
-from atg_fg.joint_recognition import JointRecognitionGraph
-from atg_fg.memory_learning import learned_memory
-from atg_fg.patterns import Evidence
+from atg_fg.core.aspect_graph import AspectTransitionGraph
+from atg_fg.core.assumptions import arcube_assumptions
+from atg_fg.core.goals import Goal
+from atg_fg.core.patterns import Evidence
+from atg_fg.display.atg_picture import draw_atg
+from atg_fg.display.figures import PALETTE, figure_class, plot_style
+from atg_fg.experiments.exploration import learned_memory
+from atg_fg.experiments.goal_scores import summarise
+from atg_fg.experiments.goals import COMPLETE, GoalPlan, run_many
+from atg_fg.experiments.trial import run_trial
+from atg_fg.inference.all_different import different_identities
+from atg_fg.inference.joint_factor_graph import JointRecognitionGraph
+from atg_fg.inference.known_transitions import transitions_of_graph
 from atg_fg.policies import ExplorationPolicy, GoalPolicy
-from atg_fg.trial import run_trial
-from atg_fg.worlds import ARcubeWorld
+from atg_fg.policies.shortest_paths import nearest_aspect, reachable_aspects, shortest_path
+from atg_fg.worlds.arcube import make_arcubes, shown_pattern
+from atg_fg.worlds.arcube_world import ARcubeWorld
 
 assumptions = arcube_assumptions()
 alphabet = assumptions.alphabet

@@ -7,7 +7,8 @@ import numpy as np
 
 def rendering_and_detection() -> str:
     """Render one cube with the camera and read its tags; the truth is known."""
-    from atg_fg.worlds import detection_of, make_world
+    from atg_fg.worlds.base import detection_of
+    from atg_fg.worlds.registry import make_world
 
     world = make_world("rendered")
     observation, info = world.reset(seed=0, options={"object": 0, "orientation": 0})
@@ -20,7 +21,7 @@ def rendering_and_detection() -> str:
 
 def robot() -> str:
     """Let the robot flip a cube; the truth is known."""
-    from atg_fg.worlds import make_world
+    from atg_fg.worlds.registry import make_world
 
     world = make_world("robonaut")
     world.reset(seed=0, options={"object": 0})

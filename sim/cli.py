@@ -12,9 +12,10 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from atg_fg import figures, store
 from atg_fg.cli import options
-from atg_fg.presets import write_preset
+from atg_fg.display import figures
+from atg_fg.storage import plain_files
+from atg_fg.storage.presets import write_preset
 
 app = typer.Typer(
     help="The simulated robot: reliability, calibration, pictures. Example: atg-fg sim picture", no_args_is_help=True
@@ -38,7 +39,7 @@ def reliability(
 
     Example: atg-fg sim reliability --condition worn --actions 200 --json worn.json
     """
-    from sim.robot.reliability import summarise
+    from sim.reliability import summarise
 
     runs = _run(condition, actions, stations, seed, urdf, jobs, json_file)
     summary = summarise(runs)
@@ -60,11 +61,11 @@ def calibrate(
 
     Example: atg-fg sim calibrate worn.json --output robot.json
     """
-    from sim.robot.calibration import calibrate as estimate
-    from sim.robot.calibration import read_counts
+    from sim.noise_calibration import calibrate as estimate
+    from sim.noise_calibration import read_counts
 
     options.check_json_option(json_file)
-    store.check_writable(output)
+    plain_files.check_writable(output)
     counts = read_counts(files)
     parameters, missing_rate = estimate(counts)
     command = f"atg-fg sim calibrate {' '.join(map(str, files))}"
@@ -90,7 +91,7 @@ def picture(
     Example: atg-fg sim picture --output robot.png --film actions.gif --table table.png
     """
     options.check_at_least(0, seed=seed)
-    from sim.robot.pictures import draw_actions, draw_flip, draw_table
+    from sim.pictures import draw_actions, draw_flip, draw_table
 
     for file in (output, table):
         if file is not None:
@@ -107,7 +108,7 @@ def _run(
     condition: str, actions: int, stations: int, seed: int, urdf: Path | None, jobs: int | None, json_file: str | None
 ) -> list[Any]:
     """Check the options and run the actions, with a progress bar."""
-    from sim.robot.reliability import ACTIONS_A_TRIAL, run_actions
+    from sim.reliability import ACTIONS_A_TRIAL, run_actions
 
     options.check_at_least(1, actions=actions, stations=stations, jobs=jobs)
     options.check_at_least(0, seed=seed)

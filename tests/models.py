@@ -11,14 +11,14 @@ from typing import Any, TypeAlias
 import numpy as np
 from hypothesis import strategies as st
 
-from atg_fg.assumptions import Assumptions
+from atg_fg.core.aspect_graph import AspectTransitionGraph
+from atg_fg.core.assumptions import Assumptions
+from atg_fg.core.errors import ImpossibleEvidenceError
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.patterns import Evidence, PatternAlphabet
 from atg_fg.engines import begin_trial
-from atg_fg.engines.base import Inference
-from atg_fg.errors import ImpossibleEvidenceError
-from atg_fg.graph import AspectTransitionGraph
-from atg_fg.memory import RobotMemory
-from atg_fg.parameters import ModelParameters
-from atg_fg.patterns import Evidence, PatternAlphabet
+from atg_fg.inference.interface import Inference
 from tests.oracle import Atg, Oracle
 
 ALPHAS = (0.0, 1e-8, 0.1, 1.0, 5.0)

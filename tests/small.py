@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from atg_fg.assumptions import Assumptions
+from atg_fg.core.aspect_graph import AspectTransitionGraph
+from atg_fg.core.assumptions import Assumptions
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.patterns import Evidence, PatternAlphabet
 from atg_fg.engines import ENGINES, begin_trial
-from atg_fg.engines.base import Inference
-from atg_fg.graph import AspectTransitionGraph
-from atg_fg.memory import RobotMemory
-from atg_fg.parameters import ModelParameters
-from atg_fg.patterns import Evidence, PatternAlphabet
+from atg_fg.inference.interface import Inference
 
 EXACT_ENGINES = [name for name, engine in ENGINES.items() if engine.exact]
 APPROXIMATE_ENGINES = [name for name, engine in ENGINES.items() if not engine.exact]

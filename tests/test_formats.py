@@ -5,43 +5,43 @@ from pathlib import Path
 
 import pytest
 
-from atg_fg import store
-from atg_fg.ablation import AblationLog, Cell
-from atg_fg.database.copying import records_in_log
-from atg_fg.goal_records import GoalRunFile
-from atg_fg.memory import RobotMemory
-from atg_fg.presets import preset
-from atg_fg.scripted_trial import read_script
-from atg_fg.structure.memory import StructuredMemory
-from atg_fg.trial_log import read_trials
+from atg_fg.experiments.ablation import AblationLog, Cell
+from atg_fg.experiments.goals import GoalRunFile
+from atg_fg.learning.structured_memory import StructuredMemory
+from atg_fg.storage import memory_files, memory_json
+from atg_fg.storage.database.copying import records_in_log
+from atg_fg.storage.database.keeper import open_memory
+from atg_fg.storage.presets import preset
+from atg_fg.storage.scripted_trial import read_script
+from atg_fg.storage.trial_log import read_trials
 
 FORMATS = Path(__file__).parent / "data" / "formats"
 
 
 def test_memory_1() -> None:
-    memory = store.load_memory(FORMATS / "memory-1.json")
+    memory = memory_files.load_memory(FORMATS / "memory-1.json")
     assert memory.names == ("object-000", "object-001")
-    assert store.memory_to_json(memory) == (FORMATS / "memory-1.json").read_text()
+    assert memory_json.memory_to_json(memory) == (FORMATS / "memory-1.json").read_text()
 
 
 def test_memory_1_with_structure_and_merges() -> None:
-    memory = store.load_memory(FORMATS / "memory-1-structured.json")
+    memory = memory_files.load_memory(FORMATS / "memory-1-structured.json")
     assert isinstance(memory, StructuredMemory)
     assert (memory.names, len(memory.learner.trials)) == (("object-000",), 2)
     assert [merge.dropped.name for merge in memory.merges] == ["object-001"]
-    assert store.memory_to_json(memory) == (FORMATS / "memory-1-structured.json").read_text()
+    assert memory_json.memory_to_json(memory) == (FORMATS / "memory-1-structured.json").read_text()
 
 
 @pytest.mark.parametrize("name", ["memory-1.json", "memory-1-structured.json", "memory-schema-1.db"])
 def test_every_memory_goes_into_a_database_and_back(name: str, tmp_path: Path) -> None:
-    memory = store.load_memory(FORMATS / name)
-    store.save_memory(memory, tmp_path / "robot.db")
-    store.save_memory(store.load_memory(tmp_path / "robot.db"), tmp_path / "memory.json")
-    assert store.load_memory(tmp_path / "memory.json") == memory
+    memory = memory_files.load_memory(FORMATS / name)
+    memory_files.save_memory(memory, tmp_path / "robot.db")
+    memory_files.save_memory(memory_files.load_memory(tmp_path / "robot.db"), tmp_path / "memory.json")
+    assert memory_files.load_memory(tmp_path / "memory.json") == memory
 
 
 def test_database_schema_1(tmp_path: Path) -> None:
-    with RobotMemory.open(shutil.copy(FORMATS / "memory-schema-1.db", tmp_path)) as memory:
+    with open_memory(shutil.copy(FORMATS / "memory-schema-1.db", tmp_path)) as memory:
         assert memory.names == ("object-000", "object-001")
         assert [(each.kind, each.seed) for each in memory.experiments()] == [("trial", 0)]
         assert [trial.learned for trial in memory.trials()] == ["object-000", "object-001"]

@@ -10,7 +10,6 @@ from typing import Annotated
 import typer
 import typer.exceptions
 
-from atg_fg import __version__
 from atg_fg.cli import (
     ablation,
     demo,
@@ -20,14 +19,14 @@ from atg_fg.cli import (
     explain,
     goal,
     memory,
-    report,
     rescore,
     structure,
     trials,
     uai,
     watch,
 )
-from atg_fg.errors import AtgError
+from atg_fg.core.errors import AtgError
+from atg_fg.core.version import __version__
 
 app = typer.Typer(
     name="atg-fg",
@@ -64,7 +63,6 @@ app.command()(goal.goal)
 app.command()(trials.trial)
 app.command()(trials.replay)
 app.command()(explain.explain)
-app.command()(report.report)
 app.command()(watch.watch)
 app.command()(engines.compare)
 app.command()(engines.calibrate)

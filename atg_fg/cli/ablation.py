@@ -8,14 +8,15 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from atg_fg import ablation as experiment
-from atg_fg import figures, store
-from atg_fg.ablation import NOISES, VARIANTS, AblationLog, Cell
 from atg_fg.cli import options
 from atg_fg.cli.experiments import parse_actions, success_with_interval
-from atg_fg.errors import InvalidInputError, unknown_name
-from atg_fg.plots import plot_ablation
-from atg_fg.worlds import WORLDS
+from atg_fg.core.errors import InvalidInputError, unknown_name
+from atg_fg.display import figures
+from atg_fg.display.success_plots import plot_ablation
+from atg_fg.experiments import ablation as experiment
+from atg_fg.experiments.ablation import NOISES, VARIANTS, AblationLog, Cell
+from atg_fg.storage import plain_files
+from atg_fg.worlds.registry import WORLDS
 
 
 def ablation(
@@ -53,7 +54,7 @@ def ablation(
     ]
     kept = None
     if log is not None:
-        store.check_writable(log)
+        plain_files.check_writable(log)
         kept = AblationLog(log, trials)
     with options.progress_bar("tests", len(cells) * tests) as advance:
         seeds = range(seed, seed + tests)

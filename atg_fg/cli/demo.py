@@ -10,21 +10,25 @@ from typing import Annotated, Any, Final
 import numpy as np
 import typer
 
-from atg_fg import figures, plots, store
-from atg_fg.arcube import Cube, make_arcubes
-from atg_fg.assumptions import arcube_assumptions
 from atg_fg.cli import options
 from atg_fg.cli.story import Story
+from atg_fg.core.assumptions import arcube_assumptions
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.records import TrialRecord, TrialStep
+from atg_fg.display import figures
+from atg_fg.display import trial_plots as plots
+from atg_fg.display.frames import FrameFolder, has_camera
 from atg_fg.engines import begin_trial, check_engine
-from atg_fg.experiments import learn_from
-from atg_fg.frames import FrameFolder, has_camera
-from atg_fg.memory import RobotMemory
-from atg_fg.parameters import ModelParameters
+from atg_fg.experiments.trial import learn_from, run_trial
+from atg_fg.learning.structured_memory import memory_for
 from atg_fg.policies import EntropyPolicy, RandomPolicy
-from atg_fg.presets import preset as preset_named
-from atg_fg.structure.memory import memory_for
-from atg_fg.trial import TrialRecord, TrialStep, run_trial
-from atg_fg.worlds import World, check_arcube_world, make_world
+from atg_fg.storage import memory_files, plain_files
+from atg_fg.storage.presets import preset as preset_named
+from atg_fg.storage.trial_record import to_json_lines
+from atg_fg.worlds.arcube import Cube, make_arcubes
+from atg_fg.worlds.base import World
+from atg_fg.worlds.registry import check_arcube_world, make_world
 
 N_REMEMBERED = 6
 #: Options of the worlds that have a camera: its last frame is saved, or a film of the trial.
@@ -60,7 +64,7 @@ def demo(
     parameters = preset_named(preset)
     engine = options.engine_of(engine, parameters, "gtsam")
     figures.figure_class()  # fails now rather than at the end, if matplotlib is not installed
-    folder = store.make_folder(output)
+    folder = plain_files.make_folder(output)
     console = options.console(json_file)
     learn_seed, trial_seed = np.random.SeedSequence(seed).spawn(2)
     check_engine(engine, parameters)
@@ -93,7 +97,7 @@ def demo(
         truth = None if novel else record.names[presented]
         console.print(f"truth:   {truth or 'a new object'}")
         header = {"engine": engine, "preset": preset, "world": world, "seed": seed}
-        lines = record.to_json_lines(camera.names if camera is not None else (), **header)
+        lines = to_json_lines(record, camera.names if camera is not None else (), **header)
         _save(folder, made_world, record, memory, lines)
     saved = [str(path) for path in sorted(folder.iterdir())]
     console.print(f"saved:   {', '.join(saved)}")
@@ -131,6 +135,6 @@ def _save(folder: Path, world: World, record: TrialRecord, memory: RobotMemory, 
         figures.save_image(picture, folder / "frame.png")
     figures.save_figure(plots.plot_belief(record), folder / "belief.png")
     figures.save_figure(plots.plot_entropy(record), folder / "entropy.png")
-    store.write_bytes_atomically(folder / "trial.jsonl", lines.encode())
+    plain_files.write_bytes_atomically(folder / "trial.jsonl", lines.encode())
     learn_from(record, memory)
-    store.save_memory(memory, folder / "memory.json")
+    memory_files.save_memory(memory, folder / "memory.json")

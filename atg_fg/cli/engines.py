@@ -8,11 +8,12 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from atg_fg import calibration, comparison
 from atg_fg.cli import options
+from atg_fg.core.errors import unknown_name
 from atg_fg.engines import ENGINES
-from atg_fg.errors import unknown_name
-from atg_fg.presets import preset as preset_named
+from atg_fg.experiments import calibration
+from atg_fg.experiments import engine_comparison as comparison
+from atg_fg.storage.presets import preset as preset_named
 
 
 def compare(

@@ -11,13 +11,15 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from atg_fg import figures, store
 from atg_fg.cli import options
-from atg_fg.errors import InvalidInputError
-from atg_fg.experiments import TestPlan, TestResult, actions_a_trial, run_tests, summarise
-from atg_fg.figure3 import Figure3Log, figure3_points
-from atg_fg.plots import plot_success
-from atg_fg.presets import preset as preset_named
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.display import figures
+from atg_fg.display.success_plots import plot_success
+from atg_fg.experiments.figure3 import Figure3Log, figure3_points
+from atg_fg.experiments.scores import TestResult, actions_a_trial, summarise
+from atg_fg.experiments.table1 import TestPlan, run_tests
+from atg_fg.storage import memory_files, plain_files
+from atg_fg.storage.presets import preset as preset_named
 
 #: The average row of Table 1 as printed in the paper (5 tests, 10 actions a trial).
 PAPER_TABLE1 = {"identification": 0.816, "recognition": 0.907, "success": 0.792}
@@ -72,14 +74,14 @@ def table1(
     options.check_json_option(json_file)
     if resume and records is None:
         raise InvalidInputError("--resume: no records to go on from; expected --records with their folder")
-    if save_memories is not None and store.goes_to_database(save_memories):
-        store.check_writable(save_memories)
+    if save_memories is not None and memory_files.goes_to_database(save_memories):
+        plain_files.check_writable(save_memories)
         if tests > 1:
             raise InvalidInputError(
                 f"--save-memories: {save_memories} takes one memory; expected --tests 1 or a folder"
             )
     elif save_memories is not None:
-        store.make_folder(save_memories)
+        plain_files.make_folder(save_memories)
     world_options = options.world_options(slip, wrong, missing, condition, urdf, world_option)
     model = preset_named(preset)
     engine = options.engine_of(engine, model, "gtsam")
@@ -189,7 +191,7 @@ def figure3(
     options.check_json_option(json_file)
     # Before the long run, so that its result is not lost.
     if csv_file is not None:
-        store.check_writable(csv_file)
+        plain_files.check_writable(csv_file)
     if plot is not None:
         figures.check_figure_path(plot)
     model = preset_named(preset)
@@ -203,7 +205,7 @@ def figure3(
     )
     kept = None
     if log is not None:
-        store.check_writable(log)
+        plain_files.check_writable(log)
         kept = Figure3Log(log, plan)
     seeds = range(seed, seed + tests)
     with options.progress_bar("tests", len(numbers) * len(FIGURE3_POLICIES) * tests) as advance:
@@ -222,7 +224,7 @@ def figure3(
     }
     options.write_json({"command": "figure3", "parameters": parameters, "points": points}, json_file)
     if csv_file is not None:
-        store.write_bytes_atomically(csv_file, _csv(points).encode())
+        plain_files.write_bytes_atomically(csv_file, _csv(points).encode())
     if plot is not None:
         figures.save_figure(plot_success(points, title=f"Figure 3: {world} world, preset {preset}"), plot)
     if json_file != "-":

@@ -9,11 +9,12 @@ import numpy as np
 import typer
 from rich.table import Table
 
-from atg_fg import store
 from atg_fg.cli import options
-from atg_fg.engines.base import Inference
-from atg_fg.explanations import Explanation, best_explanations, sample_explanations, surprise
-from atg_fg.scripted_trial import read_script, run_script, smoothed
+from atg_fg.experiments.replay import run_script, smoothed
+from atg_fg.inference.explanations import Explanation, best_explanations, sample_explanations, surprise
+from atg_fg.inference.interface import Inference
+from atg_fg.storage import plain_files
+from atg_fg.storage.scripted_trial import read_script
 
 
 def explain(
@@ -32,7 +33,7 @@ def explain(
     options.check_at_least(1, k=k)
     options.check_at_least(0, samples=samples, seed=seed)
     options.check_json_option(json_file)
-    inference = run_script(read_script(store.read_text_file(file), str(file)), engine)
+    inference = run_script(read_script(plain_files.read_text_file(file), str(file)), engine)
     chain = inference.chain()
     best = best_explanations(chain, k)
     document: dict[str, Any] = {

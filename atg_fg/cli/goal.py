@@ -9,15 +9,15 @@ from typing import Annotated, Any, Final
 import typer
 from rich.table import Table
 
-from atg_fg import figures
 from atg_fg.cli import options
-from atg_fg.errors import InvalidInputError, unknown_name
-from atg_fg.goal_experiment import COMPLETE, GoalPlan, run_goals, run_many, run_seed
-from atg_fg.goal_scoring import summarise
+from atg_fg.core.errors import InvalidInputError, unknown_name
+from atg_fg.display import figures
+from atg_fg.experiments.goal_scores import summarise
+from atg_fg.experiments.goals import COMPLETE, GoalPlan, run_goals, run_many, run_seed
 from atg_fg.policies import POLICIES
 from atg_fg.policies.goal import PLANNERS, SETTLED
-from atg_fg.presets import preset as preset_named
-from atg_fg.worlds import World
+from atg_fg.storage.presets import preset as preset_named
+from atg_fg.worlds.base import World
 
 #: How worlds with a camera are filmed: by an observer, or by what is detected at each look.
 RENDER_MODES: Final = {"rendered": "detections", "robonaut": "rgb_array_list"}

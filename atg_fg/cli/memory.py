@@ -10,17 +10,18 @@ from typing import Any
 import typer
 from rich.table import Table
 
-from atg_fg import store
 from atg_fg.cli import memory_compact, memory_duplicates, memory_files, options
-from atg_fg.database.checking import faults_of_database
-from atg_fg.database.connection import is_database
-from atg_fg.database.memory_reading import database_holds_memory
-from atg_fg.database.trial_log import read_stored_experiments, read_stored_trials
-from atg_fg.errors import InvalidInputError
-from atg_fg.json_format import parse_json
-from atg_fg.large_memory.files import is_compact, load_any_memory
-from atg_fg.memory import RobotMemory
-from atg_fg.memory_json import MEMORY_FORMAT, memory_from_document
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.memory import RobotMemory
+from atg_fg.storage import plain_files
+from atg_fg.storage.checked_json import parse_json
+from atg_fg.storage.compact_file import is_compact
+from atg_fg.storage.database.checking import faults_of_database
+from atg_fg.storage.database.connection import is_database
+from atg_fg.storage.database.memory_reading import database_holds_memory
+from atg_fg.storage.database.trial_log import read_stored_experiments, read_stored_trials
+from atg_fg.storage.memory_files import load_any_memory
+from atg_fg.storage.memory_json import MEMORY_FORMAT, memory_from_document
 
 app = typer.Typer(
     help="Look at a saved robot memory, check it, export and merge its graphs. Example: atg-fg memory show memory.json",
@@ -124,7 +125,7 @@ def _faults_of_json(file: Path) -> list[str]:
     if is_compact(file):
         load_any_memory(file)
         return []
-    document = parse_json(store.read_text_file(file), str(file))
+    document = parse_json(plain_files.read_text_file(file), str(file))
     if not isinstance(document, dict) or document.get("format") != MEMORY_FORMAT:
         raise InvalidInputError(f"{file}: is no memory file; expected an object with format {MEMORY_FORMAT!r}")
     try:

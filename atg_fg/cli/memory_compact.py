@@ -7,12 +7,12 @@ from typing import Annotated
 
 import typer
 
-from atg_fg import store
 from atg_fg.cli import options
-from atg_fg.errors import InvalidInputError
-from atg_fg.large_memory.compact_memory import CompactMemory
-from atg_fg.large_memory.files import SUFFIX, is_compact, save_compact_memory
-from atg_fg.structure.memory import StructuredMemory
+from atg_fg.core.compact.compact_memory import CompactMemory
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.learning.structured_memory import StructuredMemory
+from atg_fg.storage import memory_files, plain_files
+from atg_fg.storage.compact_file import SUFFIX, is_compact, save_compact_memory
 
 
 def compact(
@@ -27,8 +27,8 @@ def compact(
     options.check_json_option(json_file)
     if not is_compact(output):
         raise InvalidInputError(f"--output: {str(output)!r}; expected a name that ends in {SUFFIX}")
-    store.check_writable(output)
-    memory = store.load_memory(file)
+    plain_files.check_writable(output)
+    memory = memory_files.load_memory(file)
     if memory.merges or isinstance(memory, StructuredMemory):
         raise InvalidInputError(f"{file}: merges or a learned structure; expected ATGs alone, as arrays keep no more")
     made = CompactMemory.of(memory)

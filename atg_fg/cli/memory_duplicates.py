@@ -10,13 +10,14 @@ from typing import Annotated
 
 import typer
 
-from atg_fg import store
 from atg_fg.cli import options
-from atg_fg.database.connection import is_database
-from atg_fg.duplicates import find_duplicates
-from atg_fg.memory import RobotMemory
-from atg_fg.presets import preset as preset_named
-from atg_fg.structure.memory import StructuredMemory
+from atg_fg.core.memory import RobotMemory
+from atg_fg.learning.duplicates import find_duplicates
+from atg_fg.learning.structured_memory import StructuredMemory
+from atg_fg.storage import memory_files, plain_files
+from atg_fg.storage.database.connection import is_database
+from atg_fg.storage.database.keeper import open_memory
+from atg_fg.storage.presets import preset as preset_named
 
 
 def duplicates(
@@ -37,7 +38,7 @@ def duplicates(
     Example: atg-fg memory duplicates memory.json --merge
     """
     options.check_json_option(json_file)
-    with _changed(file) if merge else nullcontext(store.load_memory(file)) as memory:
+    with _changed(file) if merge else nullcontext(memory_files.load_memory(file)) as memory:
         usual = "learned" if isinstance(memory, StructuredMemory) else "default"
         parameters = preset_named(preset or usual)
         pairs = found = find_duplicates(memory, parameters, threshold)
@@ -72,12 +73,12 @@ def unmerge(
 def _changed(file: Path) -> Iterator[RobotMemory]:
     """Give a memory, and write to its file what was changed, all of it or nothing."""
     if is_database(file):
-        with RobotMemory.open(file) as memory, memory.transaction():
+        with open_memory(file) as memory, memory.transaction():
             yield memory
         return
-    store.check_writable(file)
-    memory = store.load_memory(file)
+    plain_files.check_writable(file)
+    memory = memory_files.load_memory(file)
     before = memory.merges
     yield memory
     if memory.merges != before:
-        store.save_memory(memory, file)
+        memory_files.save_memory(memory, file)

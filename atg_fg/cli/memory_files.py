@@ -8,22 +8,22 @@ from typing import Annotated, Any, Final
 
 import typer
 
-from atg_fg import store
 from atg_fg.cli import options
-from atg_fg.database.connection import is_database, open_to_write, translated, written
-from atg_fg.database.copying import add_records, records_in, records_in_log
-from atg_fg.database.memory_reading import database_holds_memory, holds_memory, read_memory_rows
-from atg_fg.database.memory_writing import replace_memory
-from atg_fg.database.stored import Experiment, StoredTrial
-from atg_fg.database.trial_log import read_stored_trials
-from atg_fg.errors import InvalidInputError
-from atg_fg.export import view_to_dot, view_to_graphml
-from atg_fg.large_memory.files import load_any_memory
-from atg_fg.memory import RobotMemory
-from atg_fg.memory_difference import difference
-from atg_fg.memory_union import unite
-from atg_fg.structure.completion import completed_atg
-from atg_fg.structure.memory import StructuredMemory
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.records import Experiment, StoredTrial
+from atg_fg.learning.completion import completed_atg
+from atg_fg.learning.memory_union import unite
+from atg_fg.learning.structured_memory import StructuredMemory
+from atg_fg.storage import memory_files, memory_json, plain_files
+from atg_fg.storage.database.connection import is_database, open_to_write, translated, written
+from atg_fg.storage.database.copying import add_records, records_in, records_in_log
+from atg_fg.storage.database.memory_reading import database_holds_memory, holds_memory, read_memory_rows
+from atg_fg.storage.database.memory_writing import replace_memory
+from atg_fg.storage.database.trial_log import read_stored_trials
+from atg_fg.storage.graph_export import view_to_dot, view_to_graphml
+from atg_fg.storage.memory_difference import difference
+from atg_fg.storage.memory_files import load_any_memory
 
 GRAPH_FORMATS: Final = {"graphml": view_to_graphml, "dot": view_to_dot}
 EXPORTS: Final = (*GRAPH_FORMATS, "json", "trials")
@@ -53,13 +53,13 @@ def export(
     elif name is not None or completed:
         raise InvalidInputError(f"--format {format_name} is of the whole memory; expected no --name or --completed")
     elif format_name == "json":
-        text = store.memory_to_json(load_any_memory(file))
+        text = memory_json.memory_to_json(load_any_memory(file))
     else:
         text = _trials_text(file)
     if output is None:
         typer.echo(text, nl=False)
     else:
-        store.write_bytes_atomically(output, text.encode())
+        plain_files.write_bytes_atomically(output, text.encode())
 
 
 def _graph_text(file: Path, name: str | None, format_name: str, *, completed: bool) -> str:
@@ -104,7 +104,7 @@ def import_files(
     logs = [file for file in files if _is_log(file)]
     records: list[list[tuple[Experiment | None, list[StoredTrial]]]] = [[records_in_log(file)] for file in logs]
     records += [list(records_in(file)) for file in files if is_database(file)]
-    memories = [store.load_memory(file) for file in files if file not in logs and _has_memory(file)]
+    memories = [memory_files.load_memory(file) for file in files if file not in logs and _has_memory(file)]
     full = [memory for memory in memories if len(memory)] or memories[:1]
     with translated(into):
         connection = open_to_write(into, create=True)
@@ -149,15 +149,15 @@ def merge(
     Example: atg-fg memory merge robot.db other.json -o both.db
     """
     options.check_json_option(json_file)
-    store.check_writable(output)
+    plain_files.check_writable(output)
     if output.exists():
         raise InvalidInputError(f"{output}: is already there; expected the path of a new file")
     union = unite(load_any_memory(first), load_any_memory(second))
     n_trials = 0
-    if store.goes_to_database(output):
+    if memory_files.goes_to_database(output):
         n_trials = _save_with_records(union.memory, output, first, second, union.renamed)
     else:
-        store.save_memory(union.memory, output)
+        memory_files.save_memory(union.memory, output)
     document = {
         "command": "memory merge",
         "objects": len(union.memory),

@@ -14,15 +14,16 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
-from atg_fg import store
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.parameters import ModelParameters
 from atg_fg.engines import ENGINES
 from atg_fg.engines.learned_structure import LearnedStructure
-from atg_fg.errors import InvalidInputError
-from atg_fg.executors import EXECUTORS, check_executor, is_cluster
-from atg_fg.parameters import ModelParameters
+from atg_fg.experiments.executors.base import EXECUTORS, check_executor, is_cluster
 from atg_fg.policies import POLICIES, check_settled
-from atg_fg.presets import PRESETS
-from atg_fg.worlds import ARCUBE_WORLDS, WORLDS, probability_option
+from atg_fg.storage import plain_files
+from atg_fg.storage.presets import PRESETS
+from atg_fg.worlds.base import probability_option
+from atg_fg.worlds.registry import ARCUBE_WORLDS, WORLDS
 
 
 def available_cpus() -> int:
@@ -138,7 +139,7 @@ def check_settled_option(settled: float | None) -> None:
 def check_json_option(path: str | None) -> None:
     """Refuse a JSON path that cannot be written, before any work is done."""
     if path not in (None, "-"):
-        store.check_writable(str(path))
+        plain_files.check_writable(str(path))
 
 
 def write_json(document: dict[str, Any], path: str | None) -> None:
@@ -149,7 +150,7 @@ def write_json(document: dict[str, Any], path: str | None) -> None:
     if path == "-":
         sys.stdout.write(text)
     else:
-        store.write_bytes_atomically(path, text.encode())
+        plain_files.write_bytes_atomically(path, text.encode())
 
 
 def console(json_path: str | None = None) -> Console:

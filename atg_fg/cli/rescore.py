@@ -8,12 +8,12 @@ from typing import Annotated
 import typer
 from rich.table import Table
 
-from atg_fg.assumptions import arcube_assumptions
 from atg_fg.cli import options
+from atg_fg.core.assumptions import arcube_assumptions
 from atg_fg.engines import check_engine
-from atg_fg.experiments import pooled_interval
-from atg_fg.presets import preset as preset_named
-from atg_fg.recorded_evidence import rescore as judged_anew
+from atg_fg.experiments.rescore import rescore as judged_anew
+from atg_fg.experiments.scores import pooled_interval
+from atg_fg.storage.presets import preset as preset_named
 
 
 def rescore(

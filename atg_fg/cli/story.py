@@ -5,9 +5,9 @@ from __future__ import annotations
 from rich.console import Console
 from rich.text import Text
 
-from atg_fg.belief import IdentityBelief
-from atg_fg.memory import RobotMemory
-from atg_fg.trial import TrialRecord, TrialStep
+from atg_fg.core.belief import IdentityBelief
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.records import TrialRecord, TrialStep
 
 _BAR = 24
 

@@ -4,21 +4,23 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
 
 import typer
 from rich.table import Table
 
-from atg_fg import figures, store
 from atg_fg.cli import options
-from atg_fg.errors import InvalidInputError
-from atg_fg.structure.completed_picture import draw_completed_atg, probability_text
-from atg_fg.structure.completion import CompletedGraph, completed_atg, statuses
-from atg_fg.structure.learner import BelievedStructure
-from atg_fg.structure.memory import StructuredMemory
-from atg_fg.structure.structure_picture import draw_structure
-from atg_fg.structure.words import action_text, register_names
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.display import figures
+from atg_fg.display.completed_picture import draw_completed_atg, probability_text
+from atg_fg.display.structure_picture import draw_structure
+from atg_fg.display.structure_words import action_text, register_names
+from atg_fg.learning.completion import CompletedGraph, completed_atg, statuses
+from atg_fg.learning.learner import BelievedStructure
+from atg_fg.learning.structured_memory import StructuredMemory
+from atg_fg.storage import memory_files
 
 app = typer.Typer(no_args_is_help=True)
 
@@ -49,7 +51,7 @@ def show(
     options.check_json_option(json_file)
     if plot is not None:
         figures.check_figure_path(plot)
-    memory = store.load_memory(file)
+    memory = memory_files.load_memory(file)
     learned = memory if isinstance(memory, StructuredMemory) else None
     believed = learned.learner.believed(learned.names) if learned is not None else []
     if name is not None:
@@ -94,7 +96,7 @@ def _document(
         "command": "structure show",
         "trials": len(learner.trials),
         "evaluations": learner.n_evaluations,
-        "rates": learner.rates.to_json(),
+        "rates": asdict(learner.rates),
         "structures": [
             _structure_document(each, learner.gain + math.log(each.weight / believed[0].weight), memory)
             for each in believed

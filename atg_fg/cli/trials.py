@@ -12,27 +12,27 @@ import numpy as np
 import typer
 from rich.table import Table
 
-from atg_fg import store
-from atg_fg.assumptions import arcube_assumptions
 from atg_fg.cli import options
 from atg_fg.cli.story import Story
-from atg_fg.database.connection import is_database
-from atg_fg.database.keeper import software_version
-from atg_fg.database.saving import save_database
-from atg_fg.database.stored import Experiment, StoredTrial
+from atg_fg.core.assumptions import arcube_assumptions
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.records import Experiment, StoredTrial, TrialStep
+from atg_fg.display.frames import FrameFolder
 from atg_fg.engines import begin_trial
-from atg_fg.errors import InvalidInputError
-from atg_fg.experiments import learn_from
-from atg_fg.frames import FrameFolder
-from atg_fg.large_memory.files import load_any_memory, save_any_memory
-from atg_fg.memory import RobotMemory
+from atg_fg.experiments.replay import replay as replay_script
+from atg_fg.experiments.trial import learn_from, run_trial
+from atg_fg.learning.structured_memory import memory_for
 from atg_fg.policies import make_policy
-from atg_fg.presets import preset as preset_named
-from atg_fg.scripted_trial import read_script
-from atg_fg.scripted_trial import replay as replay_script
-from atg_fg.structure.memory import memory_for
-from atg_fg.trial import TrialStep, run_trial
-from atg_fg.worlds import assumptions_of, make_world_with
+from atg_fg.storage import memory_files, plain_files
+from atg_fg.storage.database.connection import is_database
+from atg_fg.storage.database.keeper import open_memory, software_version
+from atg_fg.storage.database.saving import save_database
+from atg_fg.storage.memory_files import load_any_memory, save_any_memory
+from atg_fg.storage.presets import preset as preset_named
+from atg_fg.storage.scripted_trial import read_script
+from atg_fg.storage.trial_record import to_json_lines
+from atg_fg.worlds.registry import assumptions_of, make_world_with
 
 #: Objects of the world that ``atg-fg trial`` makes, |O|.
 N_OBJECTS: Final = 100
@@ -76,7 +76,7 @@ def trial(
     options.check_json_option(json_file)
     for path in (save_memory, record):
         if path is not None:
-            store.check_writable(path)
+            plain_files.check_writable(path)
     if frames and record is None:
         raise InvalidInputError("--frames: no record to keep them with; expected --record FILE")
     chosen_policy = make_policy(policy, settled)
@@ -105,15 +105,15 @@ def trial(
 
         result = run_trial(made_world, inference, chosen_policy, actions, rng, on_step=on_step)
         story.verdict(result)
-        lines = result.to_json_lines(camera.names if camera is not None else (), **header)
+        lines = to_json_lines(result, camera.names if camera is not None else (), **header)
         if record is not None:
-            store.write_bytes_atomically(record, lines.encode())
+            plain_files.write_bytes_atomically(record, lines.encode())
         about = {**header, "actions": actions, "cubes_seed": cubes_seed, "world_options": world_options}
         del about["seed"]
         remembered.begin_experiment("trial", about, seed)
         learned = learn_from(result, remembered)
         if save_memory is not None and not remembered.is_kept:
-            if store.goes_to_database(save_memory):
+            if memory_files.goes_to_database(save_memory):
                 experiment = Experiment("trial", about, seed, software_version())
                 save_database(remembered, save_memory, (StoredTrial.of(result, learned),), experiment)
             else:
@@ -136,7 +136,7 @@ def _opened(memory: Path | None, save_memory: Path | None) -> RobotMemory | None
     if memory is None:
         return None
     if save_memory is not None and is_database(memory) and save_memory.exists() and memory.samefile(save_memory):
-        return RobotMemory.open(memory)
+        return open_memory(memory)
     return load_any_memory(memory)
 
 
@@ -151,7 +151,7 @@ def replay(
     Example: atg-fg replay trial.json --engine bayes-filter --smooth
     """
     begin_trial(engine, RobotMemory(arcube_assumptions()), preset_named("default"))
-    scripts = [read_script(store.read_text_file(file), str(file)) for file in files]
+    scripts = [read_script(plain_files.read_text_file(file), str(file)) for file in files]
     # All are run before any is printed: a step of probability zero in one of them must not leave half an answer.
     documents = [replay_script(script, engine, smooth=smooth) for script in scripts]
     for file, document in zip(files, documents, strict=True):

@@ -9,12 +9,14 @@ from typing import Annotated, Any
 
 import typer
 
-from atg_fg import store, uai_inference
 from atg_fg.cli import options
-from atg_fg.errors import InvalidInputError
-from atg_fg.scripted_trial import read_script
-from atg_fg.uai_export import export_trial
-from atg_fg.uai_format import DiscreteModel, read_evidence, read_model, write_evidence, write_model
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.inference.elimination import queries as uai_inference
+from atg_fg.inference.elimination.discrete_model import DiscreteModel
+from atg_fg.storage import plain_files
+from atg_fg.storage.scripted_trial import read_script
+from atg_fg.storage.uai import read_evidence, read_model, write_evidence, write_model
+from atg_fg.storage.uai_export import export_trial
 
 app = typer.Typer(
     help="Solve discrete factor graphs in the UAI format, and write trials as such. "
@@ -46,10 +48,10 @@ def solve(
         raise InvalidInputError(f"--task: {task!r}; expected one of: {', '.join(TASKS)}")
     options.check_at_least(1, limit=limit)
     options.check_json_option(json_file)
-    read = read_model(store.read_text_file(model), str(model))
+    read = read_model(plain_files.read_text_file(model), str(model))
     observed: dict[int, int] = {}
     if evidence is not None:
-        observed = read_evidence(store.read_text_file(evidence), str(evidence))
+        observed = read_evidence(plain_files.read_text_file(evidence), str(evidence))
         read.check_evidence(observed, str(evidence))
     line, answer = TASKS[task](read, observed, limit)
     options.write_json({"command": "uai solve", "model": str(model), "task": task, **answer}, json_file)
@@ -98,10 +100,10 @@ def export(
     if model.resolve() == evidence.resolve():
         raise InvalidInputError(f"--evidence: {evidence} is the file of --model too; expected another file")
     for path in (model, evidence):
-        store.check_writable(path)
-    exported = export_trial(read_script(store.read_text_file(script), str(script)))
-    store.write_bytes_atomically(model, write_model(exported.model).encode())
-    store.write_bytes_atomically(evidence, write_evidence(exported.evidence).encode())
+        plain_files.check_writable(path)
+    exported = export_trial(read_script(plain_files.read_text_file(script), str(script)))
+    plain_files.write_bytes_atomically(model, write_model(exported.model).encode())
+    plain_files.write_bytes_atomically(evidence, write_evidence(exported.evidence).encode())
     typer.echo(
         f"{model}: {len(exported.names)} variables, {', '.join(exported.names)}; {len(exported.model.factors)} factors"
     )

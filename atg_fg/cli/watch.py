@@ -9,16 +9,17 @@ from typing import Annotated
 import numpy as np
 import typer
 
-from atg_fg.arcube import make_arcubes
 from atg_fg.cli import options
 from atg_fg.cli.demo import N_REMEMBERED, learn_beforehand
 from atg_fg.cli.story import Story
+from atg_fg.core.records import TrialStep
+from atg_fg.display.rerun_viewer import TrialViewer, check_path, import_rerun
 from atg_fg.engines import begin_trial, check_engine
+from atg_fg.experiments.trial import run_trial
 from atg_fg.policies import make_policy
-from atg_fg.presets import preset as preset_named
-from atg_fg.trial import TrialStep, run_trial
-from atg_fg.viewer import TrialViewer, check_path, import_rerun
-from atg_fg.worlds import check_arcube_world, make_world
+from atg_fg.storage.presets import preset as preset_named
+from atg_fg.worlds.arcube import make_arcubes
+from atg_fg.worlds.registry import check_arcube_world, make_world
 
 
 def watch(

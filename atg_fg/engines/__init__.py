@@ -5,22 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, Final
 
-from atg_fg.belief import IdentityBelief
-from atg_fg.engines.base import Inference
+from atg_fg.core.belief import IdentityBelief
+from atg_fg.core.errors import InvalidInputError, unknown_name
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
 from atg_fg.engines.bayes_filter import BayesFilter
 from atg_fg.engines.enumeration import Enumeration
 from atg_fg.engines.gibbs_sampling import GibbsSampling
 from atg_fg.engines.gtsam_elimination import GtsamElimination
 from atg_fg.engines.gtsam_routes import GtsamMarginals, GtsamMultifrontal, GtsamSequential
-from atg_fg.engines.large_memory import LargeMemory
+from atg_fg.engines.large_memory.engine import LargeMemory
 from atg_fg.engines.learned_structure import LearnedStructure
 from atg_fg.engines.loopy_belief_propagation import LoopyBeliefPropagation
 from atg_fg.engines.mean_field import MeanField
 from atg_fg.engines.options import check_known
 from atg_fg.engines.particle_filter import ParticleFilter
-from atg_fg.errors import InvalidInputError, unknown_name
-from atg_fg.memory import RobotMemory
-from atg_fg.parameters import ModelParameters
+from atg_fg.inference.interface import Inference
 
 ENGINES: Final[dict[str, type[Inference]]] = {
     engine.name: engine

@@ -6,13 +6,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from atg_fg.belief import IdentityBelief
-from atg_fg.engines.base import Inference
-from atg_fg.errors import TooLargeError
-from atg_fg.memory import RobotMemory
-from atg_fg.model import Revelation
-from atg_fg.parameters import ModelParameters
-from atg_fg.patterns import Evidence, FloatArray
+from atg_fg.core.belief import IdentityBelief
+from atg_fg.core.errors import TooLargeError
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.patterns import Evidence, FloatArray
+from atg_fg.inference.interface import Inference
+from atg_fg.inference.recognition_model import Revelation
 
 #: Most explanations (O, X_0:t) that are enumerated: 160 MB of weights.
 MAX_EXPLANATIONS = 20_000_000

@@ -12,14 +12,14 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from atg_fg.belief import IdentityBelief
-from atg_fg.chain import Chain, ForwardPass, forward_pass
+from atg_fg.core.belief import IdentityBelief
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.engines.options import whole_number
 from atg_fg.engines.sampling import drawn, split_r_hat
 from atg_fg.engines.whole_trial import Posterior, WholeTrialInference
-from atg_fg.memory import RobotMemory
-from atg_fg.parameters import ModelParameters
-from atg_fg.patterns import FloatArray, IntArray
+from atg_fg.inference.chain import Chain, ForwardPass, forward_pass
 
 #: Objects that make up less of the samples than this are left out of the diagnostic.
 LEAST_SHARE = 0.01

@@ -6,18 +6,18 @@ by any action, are the states of one variable: the *cells*. X_t is eliminated fr
     p(cell) = Σ_x belief(x, cell) · weight(x, cell)
 
 in which states of X_t with the same weights are one state, numbered anew for each object and action. Which these are
-follows from the form of a transition row, ``stay · base`` plus a few counted edges (see ``atg_fg.model``). As far as
-the base goes, they are the aspects from which the action was counted as often (``RowKinds``). In a cell that edges
-lead to, they are all aspects without such an edge (``EdgesInto``).
+follows from the form of a transition row, ``stay · base`` plus a few counted edges (see
+``atg_fg.inference.recognition_model``). As far as the base goes, they are the aspects from which the action was counted
+as often (``RowKinds``). In a cell that edges lead to, they are all aspects without such an edge (``EdgesInto``).
 """
 
 from __future__ import annotations
 
 import numpy as np
 
-from atg_fg import factors
-from atg_fg.factors import HYPOTHETICAL_KEY, Factor
-from atg_fg.patterns import FloatArray, IntArray
+from atg_fg.core.patterns import FloatArray, IntArray
+from atg_fg.inference import gtsam_factors as factors
+from atg_fg.inference.gtsam_factors import HYPOTHETICAL_KEY, Factor
 
 _NOW, _CELL = factors.aspect_key(0), HYPOTHETICAL_KEY
 

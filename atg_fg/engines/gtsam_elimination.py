@@ -1,4 +1,4 @@
-"""The factor graph of ``atg_fg.recognition``, eliminated with GTSAM as the trial goes.
+"""The factor graph of ``atg_fg.inference.factor_graph``, eliminated with GTSAM as the trial goes.
 
 The belief p(O, X_t | z_0:t) is carried forward: an action adds a factor p(X_{t+1} | X_t, a, O), and X_t is eliminated.
 For expected entropy (eq. 3) the factors of all hypothetical actions and observations are added at once. The
@@ -12,16 +12,16 @@ from typing import ClassVar
 
 import numpy as np
 
-from atg_fg import factors
-from atg_fg.belief import IdentityBelief
-from atg_fg.engines.base import FilterInference
+from atg_fg.core.belief import IdentityBelief
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.patterns import FloatArray
+from atg_fg.engines.filtering import FilterInference
 from atg_fg.engines.gtsam_cells import CellFactor, EdgesInto, RowKinds, belief_factor
-from atg_fg.expected_entropy import NextPatternJoint, expected_entropies
-from atg_fg.memory import RobotMemory
-from atg_fg.model import RecognitionModel
-from atg_fg.parameters import ModelParameters
-from atg_fg.patterns import FloatArray
-from atg_fg.recognition import RecognitionGraph
+from atg_fg.inference import gtsam_factors as factors
+from atg_fg.inference.expected_entropy import NextPatternJoint, expected_entropies
+from atg_fg.inference.factor_graph import RecognitionGraph
+from atg_fg.inference.recognition_model import RecognitionModel
 
 _STATE = factors.aspect_key(0)
 

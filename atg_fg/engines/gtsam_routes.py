@@ -14,17 +14,17 @@ from typing import Any, ClassVar, Final
 import gtsam
 import numpy as np
 
-from atg_fg import factors
-from atg_fg.belief import IdentityBelief
-from atg_fg.chain import Chain
+from atg_fg.core.belief import IdentityBelief
+from atg_fg.core.errors import TooLargeError
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.patterns import FloatArray
 from atg_fg.engines.options import one_of
 from atg_fg.engines.whole_trial import Posterior, WholeTrialInference, joint_of
-from atg_fg.errors import TooLargeError
-from atg_fg.factors import Ordering, aspect_key, object_key
-from atg_fg.memory import RobotMemory
-from atg_fg.parameters import ModelParameters
-from atg_fg.patterns import FloatArray
-from atg_fg.recognition import RecognitionGraph
+from atg_fg.inference import gtsam_factors as factors
+from atg_fg.inference.chain import Chain
+from atg_fg.inference.factor_graph import RecognitionGraph
+from atg_fg.inference.gtsam_factors import Ordering, aspect_key, object_key
 
 #: Most values of an intermediate table.
 MAX_TABLE: Final = 5_000_000

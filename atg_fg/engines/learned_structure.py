@@ -11,21 +11,23 @@ from typing import ClassVar, Final
 
 import numpy as np
 
-from atg_fg.belief import IdentityBelief, log_of, log_sum_exp
-from atg_fg.engines.bayes_filter import BayesFilter, forward_backward
-from atg_fg.imagined import ImaginedBelief
-from atg_fg.memory import RobotMemory
-from atg_fg.model import COLLECTION
-from atg_fg.parameters import ModelParameters
-from atg_fg.patterns import Evidence, FloatArray
-from atg_fg.situations import LEAST_PROBABILITY, Situation, shown_patterns_of, situations_of
-from atg_fg.structure.completion import pose_graph
-from atg_fg.structure.imagined import Following, StructureBelief
-from atg_fg.structure.learner import BelievedStructure
-from atg_fg.structure.memory import StructuredMemory
-from atg_fg.structure.pose_chain import pose_chain, pose_patterns
-from atg_fg.structure.pose_filter import PoseFilter
-from atg_fg.structure.rates import Rates
+from atg_fg.core.belief import IdentityBelief
+from atg_fg.core.log_math import log_of, log_sum_exp
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.patterns import Evidence, FloatArray
+from atg_fg.engines.bayes_filter import BayesFilter
+from atg_fg.inference.belief_components import LEAST_PROBABILITY, Situation, shown_patterns_of, situations_of
+from atg_fg.inference.belief_tree import ImaginedBelief
+from atg_fg.inference.chain import forward_backward
+from atg_fg.inference.recognition_model import COLLECTION
+from atg_fg.learning.completion import pose_graph
+from atg_fg.learning.learner import BelievedStructure
+from atg_fg.learning.pose_belief_tree import Following, StructureBelief
+from atg_fg.learning.pose_chain import pose_chain, pose_patterns
+from atg_fg.learning.pose_filter import PoseFilter
+from atg_fg.learning.rates import Rates
+from atg_fg.learning.structured_memory import StructuredMemory
 
 #: A structure less probable than this, given the trial so far, is left out of the rest of it.
 RULED_OUT: Final = 1e-9
@@ -35,7 +37,7 @@ class LearnedStructure(BayesFilter):
     """Bayes filtering of plain ATGs and, beside them, of pose and contents under learned structures.
 
     Not exact: few structures stand for all, and contents that slips leave in doubt are merged by their mean
-    (``atg_fg/structure/pose_filter.py``). What is impossible for plain ATGs is refused.
+    (``atg_fg/learning/pose_filter.py``). What is impossible for plain ATGs is refused.
     """
 
     name: ClassVar[str] = "learned-structure"

@@ -12,13 +12,14 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from atg_fg.belief import IdentityBelief, log_of, log_sum_exp
-from atg_fg.chain import Chain
+from atg_fg.core.belief import IdentityBelief
+from atg_fg.core.log_math import log_of, log_sum_exp
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.patterns import FloatArray
 from atg_fg.engines.options import number_between, one_of, whole_number
 from atg_fg.engines.whole_trial import Posterior, WholeTrialInference, joint_of
-from atg_fg.memory import RobotMemory
-from atg_fg.parameters import ModelParameters
-from atg_fg.patterns import FloatArray
+from atg_fg.inference.chain import Chain
 
 SCHEDULES = ("sequential", "parallel")
 

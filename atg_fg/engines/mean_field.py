@@ -15,15 +15,16 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from atg_fg.belief import IdentityBelief, log_sum_exp, x_log_x
-from atg_fg.engines.bayes_filter import forward_backward
+from atg_fg.core.belief import IdentityBelief
+from atg_fg.core.log_math import log_sum_exp, x_log_x
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.patterns import FloatArray
 from atg_fg.engines.options import number_between, whole_number
 from atg_fg.engines.support import SupportedInference
-from atg_fg.expected_entropy import expected_entropies_of
-from atg_fg.memory import RobotMemory
-from atg_fg.model import Revelation
-from atg_fg.parameters import ModelParameters
-from atg_fg.patterns import FloatArray
+from atg_fg.inference.chain import forward_backward
+from atg_fg.inference.expected_entropy import expected_entropies_of
+from atg_fg.inference.recognition_model import Revelation
 
 
 class MeanFieldReport(NamedTuple):

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from atg_fg.errors import InvalidInputError
+from atg_fg.core.errors import InvalidInputError
 
 
 def options_of(engine: type) -> list[str]:

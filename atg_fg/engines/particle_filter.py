@@ -6,17 +6,17 @@ from typing import ClassVar
 
 import numpy as np
 
-from atg_fg.belief import IdentityBelief, log_of, log_sum_exp
-from atg_fg.chain import forward_pass
-from atg_fg.engines.bayes_filter import forward_backward
+from atg_fg.core.belief import IdentityBelief
+from atg_fg.core.log_math import log_of, log_sum_exp
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.engines.options import whole_number
 from atg_fg.engines.sampling import drawn
 from atg_fg.engines.support import SupportedInference
-from atg_fg.expected_entropy import expected_entropies_of
-from atg_fg.memory import RobotMemory
-from atg_fg.model import COLLECTION, Revelation
-from atg_fg.parameters import ModelParameters
-from atg_fg.patterns import FloatArray, IntArray
+from atg_fg.inference.chain import forward_backward, forward_pass
+from atg_fg.inference.expected_entropy import expected_entropies_of
+from atg_fg.inference.recognition_model import COLLECTION, Revelation
 
 
 class ParticleFilter(SupportedInference):

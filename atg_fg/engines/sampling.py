@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from atg_fg.patterns import FloatArray, IntArray
+from atg_fg.core.patterns import FloatArray, IntArray
 
 
 def drawn(rows: FloatArray, rng: np.random.Generator) -> IntArray:

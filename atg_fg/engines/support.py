@@ -7,12 +7,12 @@ from abc import abstractmethod
 import numpy as np
 from numpy.typing import NDArray
 
-from atg_fg.belief import IdentityBelief
-from atg_fg.engines.base import Inference
-from atg_fg.memory import RobotMemory
-from atg_fg.model import Revelation
-from atg_fg.parameters import ModelParameters
-from atg_fg.patterns import FloatArray
+from atg_fg.core.belief import IdentityBelief
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.patterns import FloatArray
+from atg_fg.inference.interface import Inference
+from atg_fg.inference.recognition_model import Revelation
 
 
 class SupportedInference(Inference):

@@ -6,13 +6,13 @@ from collections.abc import Callable
 from functools import partial
 from typing import Final
 
-from atg_fg.errors import unknown_name
+from atg_fg.core.errors import unknown_name
 from atg_fg.policies.agent import AgentPolicy, SampledPolicy, as_policy, imported_policy
 from atg_fg.policies.base import Choice, Policy
 from atg_fg.policies.exploration import ExplorationPolicy
 from atg_fg.policies.goal import GoalPolicy
+from atg_fg.policies.information_gain import EntropyPolicy, RandomPolicy
 from atg_fg.policies.lookahead import LookaheadPolicy
-from atg_fg.policies.recognition import EntropyPolicy, RandomPolicy
 from atg_fg.policies.stopping import StoppingPolicy, check_settled
 
 __all__ = [

@@ -8,10 +8,10 @@ from typing import Any, ClassVar, Protocol
 import gymnasium
 import numpy as np
 
-from atg_fg.belief_summary import BeliefSummary
-from atg_fg.engines.base import Inference
-from atg_fg.errors import InvalidInputError
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.inference.interface import Inference
 from atg_fg.policies.base import Choice, Policy
+from atg_fg.policies.belief_features import BeliefSummary
 
 
 class Agent(Protocol):

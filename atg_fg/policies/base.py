@@ -6,9 +6,9 @@ from typing import ClassVar, NamedTuple, Protocol
 
 import numpy as np
 
-from atg_fg.engines.base import Inference
-from atg_fg.patterns import FloatArray
-from atg_fg.ties import best_actions
+from atg_fg.core.patterns import FloatArray
+from atg_fg.inference.expected_entropy import best_actions
+from atg_fg.inference.interface import Inference
 
 
 class Choice(NamedTuple):

@@ -6,10 +6,10 @@ from typing import ClassVar
 
 import numpy as np
 
-from atg_fg.engines.base import Inference
-from atg_fg.goal_planning import exploration_costs
+from atg_fg.inference.interface import Inference
 from atg_fg.policies.base import Choice
-from atg_fg.policies.outlook import Outlook, best_by_expectation
+from atg_fg.policies.expected_costs import Outlook, best_by_expectation
+from atg_fg.policies.shortest_paths import exploration_costs
 
 
 class ExplorationPolicy:

@@ -7,16 +7,16 @@ from typing import ClassVar, Final, TypeAlias
 
 import numpy as np
 
-from atg_fg.engines.base import Inference
-from atg_fg.errors import InvalidInputError, unknown_name
-from atg_fg.goal_planning import COSTS, action_costs, goal_aspects
-from atg_fg.goals import Goal
+from atg_fg.core.errors import InvalidInputError, unknown_name
+from atg_fg.core.goals import Goal
+from atg_fg.inference.belief_components import LEAST_PROBABILITY
+from atg_fg.inference.interface import Inference
 from atg_fg.policies.base import Choice
+from atg_fg.policies.expected_costs import Outlook, best_by_expectation, share_with_a_path
 from atg_fg.policies.exploration import outlooks_on_the_new
-from atg_fg.policies.outlook import Outlook, best_by_expectation, share_with_a_path
-from atg_fg.policies.recognition import EntropyPolicy
-from atg_fg.situations import LEAST_PROBABILITY
-from atg_fg.value_iteration import action_values
+from atg_fg.policies.information_gain import EntropyPolicy
+from atg_fg.policies.shortest_paths import COSTS, action_costs, goal_aspects
+from atg_fg.policies.value_iteration import action_values
 
 #: What may be done about a goal that no known path leads to.
 UNREACHABLE: Final = ("declare", "explore")
@@ -32,7 +32,7 @@ Planner: TypeAlias = Callable[[Inference, Goal], list[Outlook]]
 
 
 class ShortestPaths:
-    """Costs of the shortest known paths to the goal (``atg_fg.goal_planning``).
+    """Costs of the shortest known paths to the goal (``atg_fg.policies.shortest_paths``).
 
     Args:
         cost: Name of what an edge costs.

@@ -7,12 +7,12 @@ from typing import ClassVar, Final, NamedTuple
 
 import numpy as np
 
-from atg_fg.engines.base import Inference
-from atg_fg.errors import InvalidInputError
-from atg_fg.imagined import ImaginedBelief, ImaginedLooks
-from atg_fg.patterns import FloatArray, IntArray
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.patterns import FloatArray, IntArray
+from atg_fg.inference.belief_tree import ImaginedBelief, ImaginedLooks
+from atg_fg.inference.expected_entropy import TIE_TOLERANCE
+from atg_fg.inference.interface import Inference
 from atg_fg.policies.base import Choice, one_of_the_best
-from atg_fg.ties import TIE_TOLERANCE
 
 #: In nats: what can change the decision most is looked at first, and the rest only if that leaves it open.
 _WEIGHTS: Final = (1e-2, 1e-4, 1e-6, 1e-8)

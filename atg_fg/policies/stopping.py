@@ -7,8 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from atg_fg.engines.base import Inference
-from atg_fg.errors import InvalidInputError
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.inference.interface import Inference
 from atg_fg.policies.base import Choice, Policy
 
 

@@ -6,10 +6,10 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from atg_fg.assumptions import Assumptions
-from atg_fg.errors import InvalidInputError
-from atg_fg.json_format import placed, read_list
-from atg_fg.patterns import Detection, Evidence
+from atg_fg.core.assumptions import Assumptions
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.patterns import Detection, Evidence
+from atg_fg.storage.checked_json import placed, read_list
 
 
 def field_of(value: Any, key: str, place: str) -> Any:

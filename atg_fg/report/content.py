@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from typing import Any, TypeAlias
 
-from atg_fg.assumptions import Assumptions
-from atg_fg.patterns import Detection
+from atg_fg.core.assumptions import Assumptions
+from atg_fg.core.patterns import Detection
 
 #: (name, value) pairs in the order in which they are shown.
 Named: TypeAlias = tuple[tuple[str, float], ...]

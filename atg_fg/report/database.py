@@ -7,18 +7,18 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Final
 
-from atg_fg.assumptions import Assumptions, arcube_assumptions
-from atg_fg.database.memory_reading import database_holds_memory
-from atg_fg.database.stored import Experiment, StoredTrial
-from atg_fg.database.trial_log import TEST_KIND, read_stored_experiments, read_stored_trials
-from atg_fg.errors import InvalidInputError
-from atg_fg.memory import RobotMemory
+from atg_fg.core.assumptions import Assumptions, arcube_assumptions
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.records import Experiment, StoredTrial
 from atg_fg.report import checked
 from atg_fg.report.content import Report, TrialPage, shown_parameters
 from atg_fg.report.graphs import TrialGraphs
 from atg_fg.report.summaries import read_looks, told_verdict
 from atg_fg.report.test_log import test_report
-from atg_fg.store import load_memory
+from atg_fg.storage.database.memory_reading import database_holds_memory
+from atg_fg.storage.database.trial_log import TEST_KIND, read_stored_experiments, read_stored_trials
+from atg_fg.storage.memory_files import load_memory
 
 _NOTE: Final = (
     "A database keeps no belief over single objects: what is shown of it is the probability that the object was never "

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, TypeAlias
 
-from atg_fg.errors import InvalidInputError
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.statistics import wilson_interval
 from atg_fg.report.content import Plot, Point, Report, Series, Table, shown_parameters
-from atg_fg.statistics import wilson_interval
 
 _Views: TypeAlias = tuple[list[Table], list[Plot]]
 

@@ -9,13 +9,13 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from atg_fg.assumptions import Assumptions, arcube_assumptions
-from atg_fg.errors import InvalidInputError
-from atg_fg.json_format import check_format, parse_json, read_list
-from atg_fg.memory import RobotMemory
+from atg_fg.core.assumptions import Assumptions, arcube_assumptions
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.memory import RobotMemory
 from atg_fg.report import checked
 from atg_fg.report.content import Report, TrialPage, shown_parameters
 from atg_fg.report.summaries import read_looks, verdict_of, with_graphs
+from atg_fg.storage.checked_json import check_format, parse_json, read_list
 
 GOAL_RUN_FORMAT: Final = "atg-fg/goal-run"
 _ENDINGS: Final = {

@@ -5,10 +5,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from atg_fg.assumptions import Assumptions
-from atg_fg.graph import AspectTransitionGraph
-from atg_fg.memory import RobotMemory
-from atg_fg.patterns import Detection, Evidence
+from atg_fg.core.aspect_graph import AspectTransitionGraph
+from atg_fg.core.assumptions import Assumptions
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.patterns import Detection, Evidence
 from atg_fg.report.content import PlacedGraph
 
 #: What the graph of an object is called that no ATG is remembered of.

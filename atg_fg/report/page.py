@@ -8,10 +8,10 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from atg_fg import store
-from atg_fg.errors import MissingDependencyError
+from atg_fg.core.errors import MissingDependencyError
 from atg_fg.report.content import Report
 from atg_fg.report.drawn_plot import WIDTH, drawn
+from atg_fg.storage.plain_files import write_bytes_atomically
 
 if TYPE_CHECKING:
     from jinja2 import Environment
@@ -27,7 +27,7 @@ def write_report(report: Report, path: Path) -> None:
         InvalidInputError: The path cannot be written.
         MissingDependencyError: Jinja2 is not installed.
     """
-    store.write_bytes_atomically(path, page(report).encode())
+    write_bytes_atomically(path, page(report).encode())
 
 
 def page(report: Report) -> str:
@@ -62,12 +62,12 @@ def environment() -> Environment:
         raise MissingDependencyError(
             'report: Jinja2 is not installed; expected it from: pip install "atg-fg[report]"'
         ) from error
-    loader = PackageLoader("atg_fg", "data/report")
+    loader = PackageLoader("atg_fg.report", "data")
     return Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
 
 
 def _packaged(name: str) -> str:
-    return files("atg_fg").joinpath("data", "report", name).read_text(encoding="utf-8")
+    return files("atg_fg.report").joinpath("data", name).read_text(encoding="utf-8")
 
 
 def _source_of(script: str) -> str:

@@ -6,7 +6,7 @@ import base64
 from pathlib import Path, PurePosixPath
 from typing import Final
 
-from atg_fg.errors import InvalidInputError
+from atg_fg.core.errors import InvalidInputError
 
 _KINDS: Final = {b"\x89PNG\r\n\x1a\n": "image/png", b"\xff\xd8\xff": "image/jpeg"}
 _MOST_BYTES: Final = 8_000_000

@@ -7,18 +7,18 @@ import zlib
 from pathlib import Path
 from typing import Any, Final
 
-from atg_fg.database.connection import is_database
-from atg_fg.errors import InvalidInputError
-from atg_fg.json_format import parse_json
-from atg_fg.memory import RobotMemory
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.memory import RobotMemory
 from atg_fg.report.content import Report
 from atg_fg.report.database import read_database
 from atg_fg.report.experiments import EXPERIMENTS, read_experiment
 from atg_fg.report.goal_run import GOAL_RUN_FORMAT, read_goal_run
 from atg_fg.report.test_log import read_test_log
 from atg_fg.report.trial_record import read_trial_record
-from atg_fg.store import read_text_file
-from atg_fg.trial import TRIAL_FORMAT
+from atg_fg.storage.checked_json import parse_json
+from atg_fg.storage.database.connection import is_database
+from atg_fg.storage.plain_files import read_text_file
+from atg_fg.storage.trial_record import TRIAL_FORMAT
 
 _GZIP: Final = b"\x1f\x8b"
 _EXPECTED: Final = (

@@ -6,19 +6,19 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
-from atg_fg.assumptions import Assumptions
-from atg_fg.errors import InvalidInputError
-from atg_fg.json_format import read_list
-from atg_fg.memory import RobotMemory
+from atg_fg.core.assumptions import Assumptions
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.memory import RobotMemory
 from atg_fg.report import checked
 from atg_fg.report.content import Look, TrialPage
 from atg_fg.report.graphs import TrialGraphs
+from atg_fg.storage.checked_json import read_list
 
 _VERDICTS = ("known", "novel", "lost", "undecided")
 
 
 def read_looks(summary: Any, assumptions: Assumptions, place: str) -> list[Look]:
-    """Return the looks of a summary (``atg_fg.trial_log.summary_of``), checked.
+    """Return the looks of a summary (``atg_fg.storage.trial_log.summary_of``), checked.
 
     Raises:
         InvalidInputError: A field is missing or is not what was expected.

@@ -13,19 +13,22 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
-from atg_fg.assumptions import Assumptions, arcube_assumptions
+from atg_fg.core.assumptions import Assumptions, arcube_assumptions
+from atg_fg.core.errors import AtgError, InvalidInputError
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.patterns import Evidence
+from atg_fg.core.records import TrialOutcome
 from atg_fg.engines import begin_trial
-from atg_fg.errors import AtgError, InvalidInputError
-from atg_fg.experiments import Score, TestPlan, learn_from
-from atg_fg.memory import RobotMemory
-from atg_fg.parameters import ModelParameters
-from atg_fg.patterns import Evidence
+from atg_fg.experiments.scores import Score
+from atg_fg.experiments.table1 import TestPlan
+from atg_fg.experiments.trial import learn_from
 from atg_fg.report import checked
 from atg_fg.report.content import Look, Report, TrialPage, shown_parameters
 from atg_fg.report.summaries import read_looks, verdict_of, with_graphs
 from atg_fg.report.trial_record import best_objects
-from atg_fg.trial_log import TrialOutcome, read_log
-from atg_fg.worlds import ARCUBE_WORLDS, WORLDS, assumptions_of, make_world
+from atg_fg.storage.trial_log import read_log
+from atg_fg.worlds.registry import ARCUBE_WORLDS, WORLDS, assumptions_of, make_world
 
 #: How near a belief that is inferred again must be to the recorded one.
 _TOLERANCE: Final = 1e-6

@@ -8,15 +8,16 @@ from typing import Any
 
 import numpy as np
 
-from atg_fg.assumptions import Assumptions, arcube_assumptions
-from atg_fg.errors import InvalidInputError
-from atg_fg.json_format import check_format, parse_json, read_assumptions
-from atg_fg.memory import RobotMemory
+from atg_fg.core.assumptions import Assumptions, arcube_assumptions
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.memory import RobotMemory
 from atg_fg.report import checked
 from atg_fg.report.content import Look, Named, Report, TrialPage, shown_parameters
 from atg_fg.report.pictures import data_address
 from atg_fg.report.summaries import told_verdict, with_graphs
-from atg_fg.trial import TRIAL_FORMAT
+from atg_fg.storage.checked_json import check_format, parse_json
+from atg_fg.storage.memory_json import read_assumptions
+from atg_fg.storage.trial_record import TRIAL_FORMAT
 
 #: Remembered objects that are shown by name at each look.
 TOP = 6

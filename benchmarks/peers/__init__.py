@@ -9,9 +9,9 @@ import importlib
 import warnings
 from typing import Final
 
-from atg_fg.errors import MissingDependencyError
+from atg_fg.core.errors import MissingDependencyError
 from benchmarks.contestants import Contestant
-from benchmarks.dense_model import DenseModel
+from benchmarks.dense_tables import DenseModel
 
 #: Module and class of each peer, and the module that has to be installed.
 PEERS: Final[dict[str, tuple[str, str, str]]] = {

@@ -9,9 +9,9 @@ import jax.numpy as jnp
 import numpy as np
 from jax.scipy.special import xlogy
 
-from atg_fg.patterns import Evidence, FloatArray
+from atg_fg.core.patterns import Evidence, FloatArray
 from benchmarks.contestants import Contestant
-from benchmarks.dense_model import DenseModel
+from benchmarks.dense_tables import DenseModel
 
 
 class JaxFilter(Contestant):

@@ -9,8 +9,8 @@ from pgmpy.factors.discrete import TabularCPD
 from pgmpy.inference import VariableElimination
 from pgmpy.models import DiscreteBayesianNetwork
 
-from atg_fg.patterns import FloatArray
-from benchmarks.dense_model import DenseModel
+from atg_fg.core.patterns import FloatArray
+from benchmarks.dense_tables import DenseModel
 from benchmarks.peers.slices import ARCS, SlicesContestant
 
 

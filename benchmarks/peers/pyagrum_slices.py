@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 import pyagrum
 
-from atg_fg.patterns import FloatArray
-from benchmarks.dense_model import DenseModel
+from atg_fg.core.patterns import FloatArray
+from benchmarks.dense_tables import DenseModel
 from benchmarks.peers.slices import ARCS, SlicesContestant
 
 

@@ -10,9 +10,9 @@ import jax.numpy as jnp
 import numpy as np
 from pymdp.agent import Agent
 
-from atg_fg.patterns import Evidence, FloatArray
+from atg_fg.core.patterns import Evidence, FloatArray
 from benchmarks.contestants import Contestant
-from benchmarks.dense_model import DenseModel
+from benchmarks.dense_tables import DenseModel
 
 
 class PymdpAgent(Contestant):

@@ -9,10 +9,10 @@ from abc import abstractmethod
 
 import numpy as np
 
-from atg_fg.expected_entropy import expected_entropies_of_table
-from atg_fg.patterns import Evidence, FloatArray
+from atg_fg.core.patterns import Evidence, FloatArray
+from atg_fg.inference.expected_entropy import expected_entropies_of_table
 from benchmarks.contestants import Contestant
-from benchmarks.dense_model import DenseModel
+from benchmarks.dense_tables import DenseModel
 
 #: Arcs of the network.
 ARCS = (("O", "X0"), ("O", "X1"), ("X0", "X1"), ("A", "X1"), ("O", "Z"), ("X1", "Z"))

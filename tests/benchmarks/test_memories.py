@@ -1,6 +1,6 @@
 import pytest
 
-from atg_fg.arcube import make_arcubes
+from atg_fg.worlds.arcube import make_arcubes
 from benchmarks.memories import (
     N_LEARNING_ACTIONS,
     course_for,

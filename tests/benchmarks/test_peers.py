@@ -5,13 +5,13 @@ import warnings
 import numpy as np
 import pytest
 
-from atg_fg.belief import x_log_x
+from atg_fg.core.errors import MissingDependencyError
+from atg_fg.core.log_math import x_log_x
+from atg_fg.core.parameters import ModelParameters
 from atg_fg.engines import begin_trial
-from atg_fg.errors import MissingDependencyError
-from atg_fg.parameters import ModelParameters
 from benchmarks import peers
 from benchmarks.contestants import TOLERANCE
-from benchmarks.dense_model import dense_model, table_bytes
+from benchmarks.dense_tables import dense_model, table_bytes
 from benchmarks.memories import course_for, remembered
 
 PARAMETERS = [ModelParameters(1e-8, 1e-8, learn_in_trial=False), ModelParameters(0.3, 0.05, learn_in_trial=False)]

@@ -1,7 +1,7 @@
 import json
 import os
 
-from atg_fg import store
+from atg_fg.storage import memory_files
 
 
 def test_the_demo_films_the_robot(run, tmp_path):
@@ -28,7 +28,7 @@ def test_the_demo_recognises_an_object_from_camera_images(run, tmp_path):
         "trial.jsonl",
     ]
     assert len(os.listdir(tmp_path / "out" / "trial.frames")) == 6
-    assert len(store.load_memory(tmp_path / "out" / "memory.json")) == 6
+    assert len(memory_files.load_memory(tmp_path / "out" / "memory.json")) == 6
 
 
 def test_the_demo_tells_a_new_object(run, tmp_path):

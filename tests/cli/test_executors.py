@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from atg_fg import cli
-from atg_fg.trial_log import read_trials
+from atg_fg.storage.trial_log import read_trials
 from tests.dask_cluster import ROOT, wait_for
 
 #: Two tests that take long enough to be met in the middle, even on a quick machine.

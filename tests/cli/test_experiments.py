@@ -5,7 +5,7 @@ import os
 import pytest
 
 from atg_fg.cli.experiments import parse_actions
-from atg_fg.errors import InvalidInputError
+from atg_fg.core.errors import InvalidInputError
 
 QUICK = ["--engine", "bayes-filter", "--trials", "8", "--jobs", "1"]
 

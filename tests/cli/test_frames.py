@@ -3,9 +3,9 @@ import json
 import numpy as np
 import pytest
 
-from atg_fg.errors import InvalidInputError
-from atg_fg.frames import FrameFolder, camera_picture, has_camera
-from atg_fg.worlds import make_world
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.display.frames import FrameFolder, camera_picture, has_camera
+from atg_fg.worlds.registry import make_world
 
 PNG = b"\x89PNG\r\n\x1a\n"
 

@@ -4,16 +4,16 @@ import json
 import networkx
 import pytest
 
-from atg_fg import store
-from atg_fg.assumptions import arcube_assumptions
-from atg_fg.memory import RobotMemory
+from atg_fg.core.assumptions import arcube_assumptions
+from atg_fg.core.memory import RobotMemory
+from atg_fg.storage import memory_files
 
 
 @pytest.fixture
 def file(tmp_path):
     memory = RobotMemory(arcube_assumptions())
     memory.learn([0, 1, 2], [0, 1], matched=None)
-    store.save_memory(memory, tmp_path / "memory.json")
+    memory_files.save_memory(memory, tmp_path / "memory.json")
     return tmp_path / "memory.json"
 
 
@@ -53,7 +53,7 @@ def test_export_writes_graphml_that_networkx_reads(run, file, tmp_path):
 def test_export_refuses_what_is_not_there(refused, file, tmp_path):
     assert "unknown name 'cup'; expected one of: object-000" in refused("memory", "export", file, "--name", "cup")
     assert "--format: 'svg'; expected one of: graphml, dot" in refused("memory", "export", file, "--format", "svg")
-    store.save_memory(RobotMemory(arcube_assumptions()), file)
+    memory_files.save_memory(RobotMemory(arcube_assumptions()), file)
     assert "the memory is empty" in refused("memory", "export", file)
 
 
@@ -63,14 +63,14 @@ def test_duplicates_are_found_merged_and_taken_apart_again(run, refused, tmp_pat
     for _ in range(2):
         memory.learn([0, 1, 2, 3, 4, 5], [0, 1, 2, 0, 1], matched=None)
     memory.learn([50, 51], [0], matched=None)
-    store.save_memory(memory, file)
+    memory_files.save_memory(memory, file)
     before = file.read_text()
     status, output, _ = run("memory", "duplicates", file)
     assert (status, file.read_text()) == (0, before)
     assert "1 pairs of 3 ATGs probably of one object\nobject-000 and object-001: log odds" in output
     (pair,) = json.loads(run("memory", "duplicates", file, "--merge", "--json", "-")[1])["pairs"]
     assert (pair["keep"], pair["drop"]) == ("object-000", "object-001")
-    assert store.load_memory(file).names == ("object-000", "object-002")
+    assert memory_files.load_memory(file).names == ("object-000", "object-002")
     assert "0 pairs of 2 ATGs merged" in run("memory", "duplicates", file, "--merge")[1]
     assert "unknown name 'object-002'; expected one of: object-001" in refused("memory", "unmerge", file, "object-002")
     assert run("memory", "unmerge", file, "object-001")[0] == 0
@@ -101,6 +101,6 @@ def test_only_atgs_go_into_a_compact_memory(refused, tmp_path):
     for _ in range(2):
         memory.learn([0, 1], [0], matched=None)
     memory.merge("object-000", "object-001")
-    store.save_memory(memory, tmp_path / "memory.json")
+    memory_files.save_memory(memory, tmp_path / "memory.json")
     error = refused("memory", "compact", tmp_path / "memory.json", "--output", tmp_path / "memory.npz")
     assert "merges or a learned structure" in error

@@ -2,16 +2,17 @@ import json
 
 import pytest
 
-from atg_fg import store
-from atg_fg.memory import RobotMemory
-from tests.database.small import add_cube, plain
+from atg_fg.core.memory import RobotMemory
+from atg_fg.storage import memory_files
+from atg_fg.storage.database.keeper import open_memory
+from tests.storage.database.small import add_cube, plain
 
 QUICK = ["--engine", "bayes-filter", "--actions", "3"]
 
 
 @pytest.fixture
 def json_file(tmp_path):
-    store.save_memory(plain(2), tmp_path / "memory.json")
+    memory_files.save_memory(plain(2), tmp_path / "memory.json")
     return tmp_path / "memory.json"
 
 
@@ -25,7 +26,7 @@ def robot(run, tmp_path):
 
 
 def test_trials_learn_in_place_and_leave_their_records(run, robot):
-    with RobotMemory.open(robot, read_only=True) as memory:
+    with open_memory(robot, read_only=True) as memory:
         assert memory.names == ("object-000", "object-001")
         assert [(each.kind, each.seed, each.parameters["actions"]) for each in memory.experiments()] == [
             ("trial", 0, 3),
@@ -60,7 +61,7 @@ def test_import_takes_logs_of_tests_and_one_memory(run, refused, robot, json_fil
     assert "0 ATGs, 1 experiments and 3 trials" in run("memory", "import", log, "--into", into)[1]
     assert "2 ATGs, 0 experiments and 0 trials" in run("memory", "import", log, json_file, "--into", into)[1]
     assert "more than one memory" in refused("memory", "import", robot, "--into", into)
-    assert store.load_memory(into) == plain(2)
+    assert memory_files.load_memory(into) == plain(2)
     assert run("memory", "check", into)[0] == 0
 
 
@@ -80,7 +81,7 @@ def test_table1_saves_the_memory_of_one_test_into_a_database(run, refused, tmp_p
     file = tmp_path / "memory.db"
     plan = ["table1", "--trials", "3", *QUICK, "--save-memories", file]
     assert run(*plan, "--tests", "1")[0] == 0
-    assert len(store.load_memory(file)) == 3
+    assert len(memory_files.load_memory(file)) == 3
     assert "expected --tests 1 or a folder" in refused(*plan, "--tests", "2")
 
 
@@ -91,7 +92,7 @@ def test_merge_unites_objects_and_records(run, refused, robot, tmp_path):
     assert status == 0
     assert "3 ATGs, 0 of them in both; 3 trials" in output
     assert "object-000 is object-002" in output
-    with RobotMemory.open(both, read_only=True) as memory:
+    with open_memory(both, read_only=True) as memory:
         assert [trial.learned for trial in memory.trials()] == ["object-000", "object-001", "object-002"]
     assert run("memory", "check", both)[0] == 0
     assert "is already there" in refused("memory", "merge", robot, other, "-o", both)
@@ -104,7 +105,7 @@ def test_diff_leaves_with_status_1_where_there_is_something_to_say(run, json_fil
     other = tmp_path / "other.db"
     memory = plain(2)
     add_cube(memory, 3)
-    store.save_memory(memory, other)
+    memory_files.save_memory(memory, other)
     status, output, _ = run("memory", "diff", json_file, other)
     assert (status, output) == (1, "+ object-002\n")
     document = json.loads(run("memory", "diff", other, json_file, "--json", "-")[1])
@@ -116,11 +117,11 @@ def test_duplicates_are_merged_and_unmerged_in_a_database(run, tmp_path):
     memory = RobotMemory(plain(0).assumptions)
     for _ in range(2):
         memory.learn([0, 1, 2, 3, 4, 5], [0, 1, 2, 0, 1], matched=None)
-    store.save_memory(memory, file)
+    memory_files.save_memory(memory, file)
     assert "1 pairs of 2 ATGs merged" in run("memory", "duplicates", file, "--merge")[1]
-    assert store.load_memory(file).names == ("object-000",)
+    assert memory_files.load_memory(file).names == ("object-000",)
     assert run("memory", "unmerge", file, "object-001")[0] == 0
-    assert store.load_memory(file) == memory
+    assert memory_files.load_memory(file) == memory
 
 
 def test_check_leaves_with_status_1_for_a_damaged_database_and_2_for_none(run, refused, robot):

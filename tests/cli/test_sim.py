@@ -1,6 +1,6 @@
 import json
 
-from atg_fg.presets import preset
+from atg_fg.storage.presets import preset
 
 
 def test_reliability_prints_rates_and_writes_them(run, tmp_path):

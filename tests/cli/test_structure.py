@@ -2,11 +2,11 @@ import json
 
 import pytest
 
-from atg_fg import store
-from atg_fg.assumptions import arcube_assumptions
-from atg_fg.memory import RobotMemory
-from atg_fg.structure.memory import StructuredMemory
-from tests.structure.boxes import INSIDE, box_memory
+from atg_fg.core.assumptions import arcube_assumptions
+from atg_fg.core.memory import RobotMemory
+from atg_fg.learning.structured_memory import StructuredMemory
+from atg_fg.storage import memory_files
+from tests.learning.boxes import INSIDE, box_memory
 
 
 @pytest.fixture(scope="module")
@@ -47,8 +47,8 @@ def test_structure_and_completed_graphs_are_drawn_and_exported(run, file, tmp_pa
 
 def test_what_an_irreversible_action_loses_is_said_and_drawn(run, tmp_path):
     file, memory = tmp_path / "memory.json", box_memory()
-    store.save_memory(memory, file)
-    assert store.load_memory(file) == memory
+    memory_files.save_memory(memory, file)
+    assert memory_files.load_memory(file) == memory
     status, output, _ = run("structure", "show", file)
     assert status == 0
     assert "8 aspects, registers front, right, top, c4, c5, c6" in output
@@ -60,8 +60,8 @@ def test_what_an_irreversible_action_loses_is_said_and_drawn(run, tmp_path):
 
 def test_memories_without_structure_say_so_in_one_line(run, refused, tmp_path):
     plain, empty = tmp_path / "plain.json", tmp_path / "empty.json"
-    store.save_memory(RobotMemory(arcube_assumptions()), plain)
-    store.save_memory(StructuredMemory(arcube_assumptions()), empty)
+    memory_files.save_memory(RobotMemory(arcube_assumptions()), plain)
+    memory_files.save_memory(StructuredMemory(arcube_assumptions()), empty)
     for file, reason in ((plain, "its trials were not kept"), (empty, "none explains its 0 trials")):
         status, output, _ = run("structure", "show", file)
         assert status == 0
@@ -78,5 +78,5 @@ def test_what_is_not_there_is_refused(run, refused, file, tmp_path):
     plain = tmp_path / "plain.json"
     memory = RobotMemory(arcube_assumptions())
     memory.learn([0], [], None)
-    store.save_memory(memory, plain)
+    memory_files.save_memory(memory, plain)
     assert "--completed" in refused("memory", "export", plain, "--completed")

@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from atg_fg import store
-from tests.test_scripted_trial import SCRIPT
+from atg_fg.storage import memory_files
+from tests.experiments.test_replay import SCRIPT
 
 COMMAND = Path(sys.executable).with_name("atg-fg")
 
@@ -70,7 +70,7 @@ def test_a_trial_learns_and_the_next_one_recognises(run, tmp_path):
     status, output, _ = run(*quick, "--record", record)
     assert status == 0
     assert "verdict: a new object" in output
-    assert store.load_memory(memory).names == ("object-000",)
+    assert memory_files.load_memory(memory).names == ("object-000",)
     assert json.loads(record.read_text().splitlines()[-1])["verdict"]["judged_novel"]
     status, output, _ = run(*quick, "--memory", memory, "--json", "-")
     document = json.loads(output)
@@ -94,7 +94,7 @@ def test_a_trial_takes_what_the_world_says_for_granted(run, refused, tmp_path):
     status, output, _ = run(*quick, "--world", "lid-box", "--save-memory", memory)
     assert status == 0
     assert "right" in output
-    assumptions = store.load_memory(memory).assumptions
+    assumptions = memory_files.load_memory(memory).assumptions
     assert (assumptions.n_objects, assumptions.n_aspects, assumptions.actions[0]) == (100, 8, "open")
     assert run(*quick, "--world", "lid-box", "--memory", memory)[0] == 0
     assert "expected 3 actions and [13, 13, 13] symbols" in refused(*quick, "--memory", memory)
@@ -108,7 +108,7 @@ def test_structure_is_learned_from_trial_to_trial(run, tmp_path):
     file = tmp_path / "memory.json"
     assert run("trial", "--preset", "learned", "--save-memory", file)[0] == 0
     assert run("trial", "--preset", "learned", "--seed", "1", "--memory", file, "--save-memory", file)[0] == 0
-    assert len(store.load_memory(file).learner.trials) == 2
+    assert len(memory_files.load_memory(file).learner.trials) == 2
     # Other presets and engines take the same file.
     assert run("trial", "--seed", "2", "--memory", file, "--engine", "bayes-filter")[0] == 0
 
@@ -118,4 +118,4 @@ def test_a_memory_of_before_begins_to_learn_structure(run, tmp_path):
     assert run("trial", "--engine", "bayes-filter", "--save-memory", file)[0] == 0
     assert "structure" not in json.loads(file.read_text())
     assert run("trial", "--preset", "learned", "--memory", file, "--save-memory", file)[0] == 0
-    assert len(store.load_memory(file).learner.trials) == 1
+    assert len(memory_files.load_memory(file).learner.trials) == 1

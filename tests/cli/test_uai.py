@@ -3,8 +3,8 @@ import math
 
 import pytest
 
-from atg_fg.uai_format import read_evidence, read_model
-from tests.test_scripted_trial import SCRIPT
+from atg_fg.storage.uai import read_evidence, read_model
+from tests.experiments.test_replay import SCRIPT
 
 #: Weights of the four assignments: 0.25, 0.75, 3.75, 0.
 MODEL = "MARKOV 2 2 2 2 1 0 2 0 1 2 0.25 0.75 4 1 3 5 0"

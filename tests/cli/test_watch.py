@@ -9,14 +9,14 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from atg_fg.arcube import make_arcubes
 from atg_fg.cli.demo import learn_beforehand
+from atg_fg.display.rerun_viewer import TrialViewer
 from atg_fg.engines import begin_trial
+from atg_fg.experiments.trial import run_trial
 from atg_fg.policies import EntropyPolicy
-from atg_fg.presets import preset
-from atg_fg.trial import run_trial
-from atg_fg.viewer import TrialViewer
-from atg_fg.worlds import make_world
+from atg_fg.storage.presets import preset
+from atg_fg.worlds.arcube import make_arcubes
+from atg_fg.worlds.registry import make_world
 
 needs_rerun = pytest.mark.skipif(importlib.util.find_spec("rerun") is None, reason="rerun-sdk is not installed")
 

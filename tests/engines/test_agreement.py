@@ -8,9 +8,9 @@ from functools import cache
 import numpy as np
 import pytest
 
+from atg_fg.core.errors import ImpossibleEvidenceError
 from atg_fg.engines import begin_trial
-from atg_fg.engines.base import Inference
-from atg_fg.errors import ImpossibleEvidenceError
+from atg_fg.inference.interface import Inference
 from tests.models import Case, random_case
 from tests.oracle import ImpossibleError, Oracle
 from tests.small import EXACT_ENGINES

@@ -10,18 +10,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from atg_fg.comparison import total_variation
+from atg_fg.core.errors import ImpossibleEvidenceError, InvalidInputError
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
 from atg_fg.engines import begin_trial
-from atg_fg.engines.base import Inference
 from atg_fg.engines.gibbs_sampling import GibbsSampling
 from atg_fg.engines.loopy_belief_propagation import SCHEDULES, LoopyBeliefPropagation
 from atg_fg.engines.mean_field import MeanField, factorised
 from atg_fg.engines.options import options_of
 from atg_fg.engines.particle_filter import ParticleFilter
 from atg_fg.engines.sampling import drawn, split_r_hat
-from atg_fg.errors import ImpossibleEvidenceError, InvalidInputError
-from atg_fg.memory import RobotMemory
-from atg_fg.parameters import ModelParameters
+from atg_fg.experiments.engine_comparison import total_variation
+from atg_fg.inference.interface import Inference
 from tests.models import Case, random_case
 from tests.small import APPROXIMATE_ENGINES, graph, one_slot, seen, trial
 

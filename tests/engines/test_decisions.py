@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 
-from atg_fg.assumptions import Assumptions
-from atg_fg.belief import IdentityBelief
-from atg_fg.engines.base import Inference
+from atg_fg.core.assumptions import Assumptions
+from atg_fg.core.belief import IdentityBelief
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.patterns import Evidence, PatternAlphabet
 from atg_fg.engines.bayes_filter import BayesFilter
 from atg_fg.engines.gtsam_cells import EdgesInto, RowKinds
 from atg_fg.engines.gtsam_elimination import GtsamElimination, HypotheticalFactors, TransitionFactors
-from atg_fg.expected_entropy import NextPatternJoint, next_pattern_joint, pattern_table
-from atg_fg.memory import RobotMemory
-from atg_fg.model import RecognitionModel
-from atg_fg.parameters import ModelParameters
-from atg_fg.patterns import Evidence, PatternAlphabet
-from atg_fg.recognition import RecognitionGraph
+from atg_fg.inference.expected_entropy import NextPatternJoint, next_pattern_joint, pattern_table
+from atg_fg.inference.factor_graph import RecognitionGraph
+from atg_fg.inference.interface import Inference
+from atg_fg.inference.recognition_model import RecognitionModel
 from tests.models import Case, cases, gone_through
 from tests.small import graph, one_slot, seen, trial
 

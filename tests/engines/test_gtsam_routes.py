@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from atg_fg.core.errors import ImpossibleEvidenceError, InvalidInputError, TooLargeError
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
 from atg_fg.engines import begin_trial, gtsam_routes
 from atg_fg.engines.gtsam_routes import ORDERINGS, GtsamRoute
-from atg_fg.errors import ImpossibleEvidenceError, InvalidInputError, TooLargeError
-from atg_fg.memory import RobotMemory
-from atg_fg.parameters import ModelParameters
 from tests.models import random_case
 from tests.small import graph, one_slot, seen, trial
 

@@ -9,22 +9,22 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from atg_fg.arcube import make_arcubes
+from atg_fg.core.errors import ImpossibleEvidenceError, InvalidInputError
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.patterns import Evidence
 from atg_fg.engines import begin_trial
-from atg_fg.errors import ImpossibleEvidenceError, InvalidInputError
-from atg_fg.experiments import TestPlan, run_test, run_tests
-from atg_fg.memory import RobotMemory
-from atg_fg.patterns import Evidence
+from atg_fg.experiments.table1 import TestPlan, run_test, run_tests
+from atg_fg.experiments.trial import run_trial
+from atg_fg.learning.learner import StructureLearner
+from atg_fg.learning.rates import Rates
+from atg_fg.learning.structured_memory import StructuredMemory
 from atg_fg.policies import EntropyPolicy
-from atg_fg.presets import preset
-from atg_fg.structure.learner import StructureLearner
-from atg_fg.structure.memory import StructuredMemory
-from atg_fg.structure.rates import Rates
-from atg_fg.trial import run_trial
-from atg_fg.worlds import make_world
+from atg_fg.storage.presets import preset
+from atg_fg.worlds.arcube import make_arcubes
+from atg_fg.worlds.registry import make_world
+from tests.learning import oracle
+from tests.learning.worlds import ARCUBES, CUBE, RING, RING_WORLD, cubes, objects_of, random_objects, trial_of
 from tests.models import random_case
-from tests.structure import oracle
-from tests.structure.worlds import ARCUBES, CUBE, RING, RING_WORLD, cubes, objects_of, random_objects, trial_of
 
 LEARNED = preset("learned")
 RATES = Rates(slip=0.05, wrong=0.02, repeat=1e-9, share=1 - 1e-9)

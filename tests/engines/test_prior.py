@@ -5,13 +5,13 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from atg_fg.belief import IdentityBelief
+from atg_fg.core.aspect_graph import AspectTransitionGraph
+from atg_fg.core.belief import IdentityBelief
+from atg_fg.core.errors import ImpossibleEvidenceError, InvalidInputError
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
 from atg_fg.engines import ENGINES, begin_trial
-from atg_fg.engines.base import Inference
-from atg_fg.errors import ImpossibleEvidenceError, InvalidInputError
-from atg_fg.graph import AspectTransitionGraph
-from atg_fg.memory import RobotMemory
-from atg_fg.parameters import ModelParameters
+from atg_fg.inference.interface import Inference
 from tests.models import Case, random_case
 from tests.oracle import ImpossibleError, Oracle
 from tests.small import EXACT_ENGINES, graph, one_slot, seen

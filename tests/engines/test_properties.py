@@ -10,10 +10,10 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from atg_fg.core.errors import ImpossibleEvidenceError
+from atg_fg.core.patterns import Evidence
 from atg_fg.engines import begin_trial
-from atg_fg.engines.base import Inference
-from atg_fg.errors import ImpossibleEvidenceError
-from atg_fg.patterns import Evidence
+from atg_fg.inference.interface import Inference
 from tests.models import Case, Look, cases
 from tests.small import EXACT_ENGINES
 

@@ -3,12 +3,12 @@
 import numpy as np
 import pytest
 
+from atg_fg.core.errors import ImpossibleEvidenceError, InvalidInputError, TooLargeError, UnknownNameError
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.patterns import Evidence
 from atg_fg.engines import ENGINES, begin_trial
-from atg_fg.engines.base import Inference
-from atg_fg.errors import ImpossibleEvidenceError, InvalidInputError, TooLargeError, UnknownNameError
-from atg_fg.memory import RobotMemory
-from atg_fg.parameters import ModelParameters
-from atg_fg.patterns import Evidence
+from atg_fg.inference.interface import Inference
 from tests.small import EXACT_ENGINES, graph, one_slot, seen, trial
 
 WORLD = one_slot(3, 2, 4)

@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 from gymnasium import spaces
 
-from atg_fg.assumptions import arcube_assumptions
-from atg_fg.belief_summary import BeliefSummary
+from atg_fg.core.assumptions import arcube_assumptions
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
 from atg_fg.engines import begin_trial
-from atg_fg.errors import InvalidInputError
-from atg_fg.experiments import TestPlan, run_test
-from atg_fg.memory import RobotMemory
-from atg_fg.parameters import ModelParameters
+from atg_fg.experiments.table1 import TestPlan, run_test
+from atg_fg.experiments.trial import run_trial
 from atg_fg.policies import AgentPolicy, EntropyPolicy, SampledPolicy, as_policy, make_policy
-from atg_fg.trial import run_trial
-from atg_fg.worlds import make_world
+from atg_fg.policies.belief_features import BeliefSummary
+from atg_fg.worlds.registry import make_world
 from tests.small import graph, one_slot, trial
 
 PLAN = TestPlan(engine="bayes-filter", n_actions=3, n_trials=6)

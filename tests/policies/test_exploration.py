@@ -1,13 +1,13 @@
 import numpy as np
 
-from atg_fg.arcube import make_arcubes
-from atg_fg.assumptions import arcube_assumptions
+from atg_fg.core.assumptions import arcube_assumptions
+from atg_fg.core.memory import RobotMemory
 from atg_fg.engines import begin_trial
-from atg_fg.memory import RobotMemory
+from atg_fg.experiments.trial import run_trial
 from atg_fg.policies import ExplorationPolicy, RandomPolicy
-from atg_fg.presets import preset
-from atg_fg.trial import run_trial
-from atg_fg.worlds import ARcubeWorld
+from atg_fg.storage.presets import preset
+from atg_fg.worlds.arcube import make_arcubes
+from atg_fg.worlds.arcube_world import ARcubeWorld
 
 
 def explored(policy, n_actions, seed):

@@ -3,21 +3,21 @@ from contextlib import closing
 import numpy as np
 import pytest
 
-from atg_fg.arcube import ORIENTATIONS, SUCCESSORS, make_arcubes, shown_pattern
-from atg_fg.assumptions import arcube_assumptions
+from atg_fg.core.aspect_graph import AspectTransitionGraph
+from atg_fg.core.assumptions import arcube_assumptions
+from atg_fg.core.errors import InvalidInputError, UnknownNameError
+from atg_fg.core.goals import Goal
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.patterns import Evidence
 from atg_fg.engines import begin_trial
-from atg_fg.errors import InvalidInputError, UnknownNameError
-from atg_fg.goal_scoring import fewest_actions
-from atg_fg.goals import Goal
-from atg_fg.graph import AspectTransitionGraph
-from atg_fg.memory import RobotMemory
-from atg_fg.memory_learning import complete_memory
-from atg_fg.parameters import ModelParameters
-from atg_fg.patterns import Evidence
+from atg_fg.experiments.exploration import complete_memory
+from atg_fg.experiments.goal_scores import fewest_actions
+from atg_fg.experiments.trial import run_trial
 from atg_fg.policies.goal import PLANNERS, GoalPolicy
-from atg_fg.presets import preset
-from atg_fg.trial import run_trial
-from atg_fg.worlds import ARcubeWorld
+from atg_fg.storage.presets import preset
+from atg_fg.worlds.arcube import ORIENTATIONS, SUCCESSORS, make_arcubes, shown_pattern
+from atg_fg.worlds.arcube_world import ARcubeWorld
 from tests.small import EXACT_ENGINES
 
 ASSUMPTIONS = arcube_assumptions()

@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
 
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
 from atg_fg.engines import begin_trial
-from atg_fg.errors import InvalidInputError
-from atg_fg.memory import RobotMemory
-from atg_fg.parameters import ModelParameters
+from atg_fg.inference.expected_entropy import best_actions
 from atg_fg.policies import EntropyPolicy, LookaheadPolicy, make_policy
 from atg_fg.policies.lookahead import bounds_ahead
-from atg_fg.ties import best_actions
 from tests.models import gone_through, random_case
 from tests.small import EXACT_ENGINES, graph, one_slot, trial
 

@@ -3,15 +3,16 @@ import json
 import numpy as np
 import pytest
 
-from atg_fg.assumptions import arcube_assumptions
+from atg_fg.core.assumptions import arcube_assumptions
+from atg_fg.core.memory import RobotMemory
 from atg_fg.engines import begin_trial
-from atg_fg.experiments import TestPlan, run_test
-from atg_fg.goal_experiment import GoalPlan, run_many
-from atg_fg.memory import RobotMemory
+from atg_fg.experiments.goals import GoalPlan, run_many
+from atg_fg.experiments.table1 import TestPlan, run_test
+from atg_fg.experiments.trial import run_trial
 from atg_fg.policies import EntropyPolicy
-from atg_fg.presets import preset
-from atg_fg.trial import run_trial
-from atg_fg.worlds import make_world
+from atg_fg.storage.presets import preset
+from atg_fg.storage.trial_record import to_json_lines
+from atg_fg.worlds.registry import make_world
 from tests.cli.conftest import refused, run
 
 __all__ = ["refused", "run"]  # fixtures of the command line, for the tests of this folder, too
@@ -43,7 +44,7 @@ def trial():
 def record(trial, tmp_path):
     """The path of a trial's record."""
     path = tmp_path / "trial.jsonl"
-    path.write_text(trial[1].to_json_lines(seed=1, preset="default"))
+    path.write_text(to_json_lines(trial[1], seed=1, preset="default"))
     return path
 
 
@@ -67,7 +68,7 @@ def goal_run(tmp_path_factory):
 @pytest.fixture
 def nasty_record(trial, tmp_path):
     """A record in which names of objects and of the preset hold what could break a page."""
-    lines = [json.loads(line) for line in trial[1].to_json_lines(preset=NASTY).splitlines()]
+    lines = [json.loads(line) for line in to_json_lines(trial[1], preset=NASTY).splitlines()]
     lines[0]["objects"] = [NASTY]
     lines[-1]["verdict"]["matched"] = NASTY
     lines[1]["purpose"] = NASTY

@@ -122,4 +122,4 @@ def test_a_page_is_written_whole(record, tmp_path):
 
 @pytest.mark.parametrize("name", ["page.css", "page.html", "trial.html", "plot.svg", "trial.js"])
 def test_templates_style_and_scripts_are_in_the_package(name):
-    assert (Path(__file__).parents[2] / "atg_fg" / "data" / "report" / name).is_file()
+    assert (Path(__file__).parents[2] / "atg_fg" / "report" / "data" / name).is_file()

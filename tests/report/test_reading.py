@@ -8,13 +8,14 @@ from pathlib import Path
 
 import pytest
 
-from atg_fg.assumptions import arcube_assumptions
-from atg_fg.errors import AtgError, InvalidInputError
-from atg_fg.experiments import TestPlan, learn_from, run_test
-from atg_fg.memory import RobotMemory
+from atg_fg.core.assumptions import arcube_assumptions
+from atg_fg.core.errors import AtgError, InvalidInputError
+from atg_fg.experiments.table1 import TestPlan, run_test
+from atg_fg.experiments.trial import learn_from
 from atg_fg.report.experiments import EXPERIMENTS
 from atg_fg.report.reading import read_report
-from atg_fg.trial_log import read_log
+from atg_fg.storage.database.keeper import open_memory
+from atg_fg.storage.trial_log import read_log
 
 RESULTS = Path(__file__).parents[2] / "results"
 
@@ -62,7 +63,7 @@ def test_a_test_in_a_database_is_told_as_its_log_is(test_log, tmp_path):
 def test_trials_that_a_database_was_taught_show_what_they_were_learned_into(trial, tmp_path):
     memory, run = trial
     path = tmp_path / "robot.db"
-    with RobotMemory.open(path, memory.assumptions) as kept:
+    with open_memory(path, memory.assumptions) as kept:
         kept.add(memory["object-000"])
         kept.begin_experiment("trial", {"preset": "default"}, 5)
         learn_from(run, kept)
@@ -76,7 +77,7 @@ def test_trials_that_a_database_was_taught_show_what_they_were_learned_into(tria
 
 
 def test_a_database_without_trials_is_refused(tmp_path):
-    RobotMemory.open(tmp_path / "robot.db", arcube_assumptions()).close()
+    open_memory(tmp_path / "robot.db", arcube_assumptions()).close()
     with pytest.raises(InvalidInputError, match="no trials; expected at least one"):
         read_report(tmp_path / "robot.db")
 

@@ -9,7 +9,7 @@ from collections import Counter
 from collections.abc import Sequence
 from typing import Any
 
-from atg_fg.statistics import wilson_interval
+from atg_fg.core.statistics import wilson_interval
 from tests.torture.disk import LEFT, run_scenarios
 from tests.torture.kills import KINDS, kill_writers
 from tests.torture.reading import MAX_BYTES, MAX_SECONDS, read_damaged

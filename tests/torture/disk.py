@@ -22,12 +22,13 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from atg_fg import store
-from atg_fg.arcube import SUCCESSORS, make_arcubes, shown_pattern
-from atg_fg.assumptions import arcube_assumptions
-from atg_fg.database.checking import faults_of_database
-from atg_fg.errors import AtgError
-from atg_fg.memory import RobotMemory
+from atg_fg.core.assumptions import arcube_assumptions
+from atg_fg.core.errors import AtgError
+from atg_fg.core.memory import RobotMemory
+from atg_fg.storage import memory_files, memory_json
+from atg_fg.storage.database.checking import faults_of_database
+from atg_fg.storage.database.keeper import open_memory
+from atg_fg.worlds.arcube import SUCCESSORS, make_arcubes, shown_pattern
 
 SIZE = 2**21
 MOUNTED = "tmpfs of 2 MiB in a mount namespace"
@@ -156,12 +157,12 @@ def learn(memory: RobotMemory, number: int) -> None:
 def full_database(place: Path, disk: Mounted | Limited, left: int) -> str | None:
     """Learn until the disk is full; the last good state stays, and learning goes on when there is room."""
     file = place / "robot.db"
-    with RobotMemory.open(file, arcube_assumptions()) as memory:
+    with open_memory(file, arcube_assumptions()) as memory:
         learn(memory, 0)
         failed = False
         with disk.full(left):
             for number in range(1, 300):
-                before = store.memory_to_json(memory)
+                before = memory_json.memory_to_json(memory)
                 try:
                     learn(memory, number)
                 except AtgError as error:
@@ -169,16 +170,16 @@ def full_database(place: Path, disk: Mounted | Limited, left: int) -> str | None
                     if "cannot be written" not in str(error):
                         return f"error {error}"
                     break
-            if failed and store.memory_to_json(memory) != before:
+            if failed and memory_json.memory_to_json(memory) != before:
                 return "the memory is not as it was before the trial that failed"
         if not failed:
             return "the disk was never full"
-        if store.memory_to_json(store.load_memory(file)) != before:
+        if memory_json.memory_to_json(memory_files.load_memory(file)) != before:
             return "the file is not as it was before the trial that failed"
         learn(memory, 400)
-        after = store.memory_to_json(memory)
+        after = memory_json.memory_to_json(memory)
     faults = faults_of_database(file)
-    if faults or store.memory_to_json(store.load_memory(file)) != after:
+    if faults or memory_json.memory_to_json(memory_files.load_memory(file)) != after:
         return f"after there was room again: {faults}"
     return None
 
@@ -188,13 +189,13 @@ def full_json(place: Path, disk: Mounted | Limited, left: int) -> str | None:
     file = place / "memory.json"
     memory = RobotMemory(arcube_assumptions())
     learn(memory, 0)
-    store.save_memory(memory, file)
+    memory_files.save_memory(memory, file)
     before = file.read_bytes()
-    while len(store.memory_to_json(memory)) <= left + 65536:
+    while len(memory_json.memory_to_json(memory)) <= left + 65536:
         learn(memory, len(memory))
     with disk.full(left):
         try:
-            store.save_memory(memory, file)
+            memory_files.save_memory(memory, file)
         except AtgError as error:
             if "cannot be written" not in str(error):
                 return f"error {error}"
@@ -206,20 +207,20 @@ def full_json(place: Path, disk: Mounted | Limited, left: int) -> str | None:
 
 
 def _learn_in_place(place: Path) -> None:
-    with RobotMemory.open(place / "robot.db") as memory:
+    with open_memory(place / "robot.db") as memory:
         learn(memory, 1)
 
 
 def _make_database(place: Path) -> None:
-    RobotMemory.open(place / "new.db", arcube_assumptions()).close()
+    open_memory(place / "new.db", arcube_assumptions()).close()
 
 
 def _save_over_database(place: Path) -> None:
-    store.save_memory(RobotMemory(arcube_assumptions()), place / "robot.db")
+    memory_files.save_memory(RobotMemory(arcube_assumptions()), place / "robot.db")
 
 
 def _save_json(place: Path) -> None:
-    store.save_memory(RobotMemory(arcube_assumptions()), place / "memory.json")
+    memory_files.save_memory(RobotMemory(arcube_assumptions()), place / "memory.json")
 
 
 READ_ONLY: dict[str, Callable[[Path], None]] = {
@@ -237,7 +238,7 @@ def read_only(disk: Mounted | Limited, write: Callable[[Path], None]) -> str | N
     memory = RobotMemory(arcube_assumptions())
     learn(memory, 0)
     for name in ("robot.db", "memory.json"):
-        store.save_memory(memory, place / name)
+        memory_files.save_memory(memory, place / name)
     before = {each.name: each.read_bytes() for each in place.iterdir()}
     fault = None
     with disk.closed(place):
@@ -248,7 +249,7 @@ def read_only(disk: Mounted | Limited, write: Callable[[Path], None]) -> str | N
             if not any(word in str(error) for word in ("cannot be written", "cannot be opened")):
                 fault = f"error {error}"
         for name in ("robot.db", "memory.json"):
-            if store.load_memory(place / name) != memory:
+            if memory_files.load_memory(place / name) != memory:
                 fault = f"{name} is read as another memory"
         if {each.name: each.read_bytes() for each in place.iterdir()} != before:
             fault = "the folder is not as it was"

@@ -19,19 +19,20 @@ from pathlib import Path
 
 import numpy as np
 
-from atg_fg import store
-from atg_fg.arcube import make_arcubes
-from atg_fg.assumptions import arcube_assumptions
+from atg_fg.core.assumptions import arcube_assumptions
+from atg_fg.core.errors import AtgError
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.records import TrialRecord
 from atg_fg.engines import begin_trial
-from atg_fg.errors import AtgError
-from atg_fg.experiments import learn_from
-from atg_fg.memory import RobotMemory
-from atg_fg.parameters import ModelParameters
+from atg_fg.experiments.trial import learn_from, run_trial
+from atg_fg.learning.search import SearchPlan
+from atg_fg.learning.structured_memory import StructuredMemory, memory_for
 from atg_fg.policies import RandomPolicy
-from atg_fg.structure.memory import StructuredMemory, memory_for
-from atg_fg.structure.search import SearchPlan
-from atg_fg.trial import TrialRecord, run_trial
-from atg_fg.worlds import make_world
+from atg_fg.storage import memory_json, plain_files
+from atg_fg.storage.database.keeper import open_memory
+from atg_fg.worlds.arcube import make_arcubes
+from atg_fg.worlds.registry import make_world
 
 #: Trials until a writer begins with a new file.
 N_TRIALS = 40
@@ -51,14 +52,14 @@ class Course:
         self.parameters = _LEARNED if structured else _PLAIN
         memory = self.empty()
         self.records: list[TrialRecord] = []
-        self.states = [store.memory_to_json(memory)]
+        self.states = [memory_json.memory_to_json(memory)]
         with closing(make_world("ideal", cubes=make_arcubes(12, seed=0))) as world:
             for number in range(N_TRIALS):
                 inference = begin_trial("bayes-filter", RobotMemory(memory.assumptions, memory), _PLAIN)
                 record = run_trial(world, inference, RandomPolicy(), 8, np.random.default_rng(number))
                 learn_from(record, memory)
                 self.records.append(record)
-                self.states.append(store.memory_to_json(memory))
+                self.states.append(memory_json.memory_to_json(memory))
 
     def empty(self) -> RobotMemory:
         return self.prepared(RobotMemory(arcube_assumptions()))
@@ -132,7 +133,7 @@ def _run_and_kill(
 
 
 def _write_database(path: Path, course: Course, written: int, pipe: int) -> None:
-    with course.prepared(RobotMemory.open(path, arcube_assumptions())) as memory:
+    with course.prepared(open_memory(path, arcube_assumptions())) as memory:
         memory.begin_experiment("torture", {"trials": N_TRIALS}, seed=0)
         for record in course.records[written:]:
             os.write(pipe, b"b")
@@ -143,7 +144,7 @@ def _write_database(path: Path, course: Course, written: int, pipe: int) -> None
 def _write_json(path: Path, course: Course, written: int, pipe: int) -> None:
     for state in course.states[written + 1 :]:
         os.write(pipe, b"b")
-        store.write_bytes_atomically(path, state.encode())
+        plain_files.write_bytes_atomically(path, state.encode())
         os.write(pipe, b"e")
 
 
@@ -176,9 +177,9 @@ def _found_in_database(path: Path, course: Course) -> tuple[int, int]:
             return -1, 0
         if connection.execute("PRAGMA foreign_key_check").fetchall():
             return -1, 0
-    with RobotMemory.open(path, arcube_assumptions()) as memory:
+    with open_memory(path, arcube_assumptions()) as memory:
         n_records = sum(1 for _ in memory.trials())
         if not isinstance(memory, StructuredMemory) and course.parameters.learn_structure and n_records == 0:
             return 0, 0
-        state = store.memory_to_json(memory)
+        state = memory_json.memory_to_json(memory)
     return (course.states.index(state) if state in course.states else -1), n_records

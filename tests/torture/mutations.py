@@ -14,20 +14,20 @@ from typing import Any
 
 import numpy as np
 
-from atg_fg import store
-from atg_fg.arcube import make_arcubes
-from atg_fg.assumptions import arcube_assumptions
+from atg_fg.core.assumptions import arcube_assumptions
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
 from atg_fg.engines import begin_trial
-from atg_fg.experiments import learn_from
-from atg_fg.memory import RobotMemory
-from atg_fg.parameters import ModelParameters
+from atg_fg.experiments.trial import learn_from, run_trial
+from atg_fg.learning.structured_memory import memory_for
 from atg_fg.policies import RandomPolicy
-from atg_fg.scripted_trial import read_script
-from atg_fg.structure.memory import memory_for
-from atg_fg.trial import run_trial
-from atg_fg.uai_export import export_trial
-from atg_fg.uai_format import write_evidence, write_model
-from atg_fg.worlds import make_world
+from atg_fg.storage import memory_files, memory_json
+from atg_fg.storage.database.keeper import open_memory
+from atg_fg.storage.scripted_trial import read_script
+from atg_fg.storage.uai import write_evidence, write_model
+from atg_fg.storage.uai_export import export_trial
+from atg_fg.worlds.arcube import make_arcubes
+from atg_fg.worlds.registry import make_world
 
 #: Where files are in RAM, so that the time is the reader's own.
 FAST = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
@@ -53,8 +53,8 @@ def originals() -> dict[str, list[bytes]]:
     plain, structured = _memory(structured=False, n_trials=5), _memory(structured=True, n_trials=2)
     exported = export_trial(read_script(_SCRIPT.read_text()))
     return {
-        "memory": [store.memory_to_json(plain).encode()],
-        "structured memory": [store.memory_to_json(structured).encode()],
+        "memory": [memory_json.memory_to_json(plain).encode()],
+        "structured memory": [memory_json.memory_to_json(structured).encode()],
         "script": [_SCRIPT.read_bytes(), _long_script()],
         "UAI model": [_UAI.encode(), write_model(exported.model).encode()],
         "UAI evidence": [b"2 0 1 2 0\n", b"1\n1 3 2\n", write_evidence(exported.evidence).encode()],
@@ -229,8 +229,8 @@ def _learn(memory: RobotMemory, n_trials: int) -> None:
 def _database(memory: RobotMemory, n_trials: int) -> bytes:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "robot.db"
-        store.save_memory(memory, path)
-        with RobotMemory.open(path) as opened:
+        memory_files.save_memory(memory, path)
+        with open_memory(path) as opened:
             opened.begin_experiment("torture", {"actions": 6}, seed=0)
             _learn(opened, n_trials)
         return path.read_bytes()
@@ -239,7 +239,7 @@ def _database(memory: RobotMemory, n_trials: int) -> bytes:
 def _long_script() -> bytes:
     """A script with several ATGs and many steps."""
     document = json.loads(_SCRIPT.read_bytes())
-    document["memory"] = json.loads(store.memory_to_json(_memory(structured=False, n_trials=5)))["memory"]
+    document["memory"] = json.loads(memory_json.memory_to_json(_memory(structured=False, n_trials=5)))["memory"]
     steps = [{"act": "flip"}, {"observe": [1, None]}, {"act": "left"}, {"observe": [None, 3]}]
     document["steps"] = [{"observe": [0, 1]}, *steps * 3]
     return json.dumps(document).encode()

@@ -21,13 +21,14 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from atg_fg import store
-from atg_fg.database.checking import faults_of_database
-from atg_fg.errors import AtgError
-from atg_fg.memory import RobotMemory
-from atg_fg.scripted_trial import read_script, replay
-from atg_fg.uai_format import read_evidence, read_model
-from atg_fg.uai_inference import log_partition, marginals
+from atg_fg.core.errors import AtgError
+from atg_fg.experiments.replay import replay
+from atg_fg.inference.elimination.queries import log_partition, marginals
+from atg_fg.storage import memory_files, memory_json, plain_files
+from atg_fg.storage.database.checking import faults_of_database
+from atg_fg.storage.database.keeper import open_memory
+from atg_fg.storage.scripted_trial import read_script
+from atg_fg.storage.uai import read_evidence, read_model
 from tests.torture.mutations import FAST, mutated, originals
 
 #: What a file may take: seconds of processor time, and bytes beyond what the process had before.
@@ -147,18 +148,18 @@ def read_as(kind: str, content: bytes, folder: Path) -> None:
     if "database" in kind:
         _use_database(path)
     elif "memory" in kind:
-        store.memory_to_json(store.load_memory(path))
+        memory_json.memory_to_json(memory_files.load_memory(path))
     elif kind == "script":
-        script = read_script(store.read_text_file(path), str(path))
+        script = read_script(plain_files.read_text_file(path), str(path))
         # A sound script may ask for a long trial among many objects. To answer it is work, and no failure.
         if (len(script.memory) + 1) * len(script.steps) * len(script.memory.assumptions.alphabet) <= _SHORT:
             replay(script, "gtsam", smooth=True)
     elif kind == "UAI model":
-        model = read_model(store.read_text_file(path), str(path))
+        model = read_model(plain_files.read_text_file(path), str(path))
         log_partition(model, limit=_LIMIT)
         marginals(model, limit=_LIMIT)
     else:
-        evidence = read_evidence(store.read_text_file(path), str(path))
+        evidence = read_evidence(plain_files.read_text_file(path), str(path))
         original = read_model(originals()["UAI model"][-1].decode())
         original.check_evidence(evidence)
 
@@ -166,7 +167,7 @@ def read_as(kind: str, content: bytes, folder: Path) -> None:
 def _use_database(path: Path) -> None:
     """Check, load, learn in place: what one of these refuses the next ones must refuse or survive, too."""
     errors: list[AtgError] = []
-    for use in (faults_of_database, store.load_memory, _learn_in_place):
+    for use in (faults_of_database, memory_files.load_memory, _learn_in_place):
         try:
             use(path)
         except AtgError as error:
@@ -176,7 +177,7 @@ def _use_database(path: Path) -> None:
 
 
 def _learn_in_place(path: Path) -> None:
-    with closing(RobotMemory.open(path)) as memory:
+    with closing(open_memory(path)) as memory:
         list(memory.experiments())
         n_trials = sum(1 for _ in memory.trials())
         memory.learn([0, 1, 2], [0, 0], None)

@@ -1,0 +1,250 @@
+"""The Aspect Transition Graph of one object (section 2 of the paper)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Final, TypeAlias
+
+import networkx
+import numpy as np
+
+from atg_fg.core.assumptions import MAX_NUMBER, Assumptions
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.patterns import IntArray, Pattern
+from atg_fg.core.table import Cell, HtmlTable, _symbols, shortened
+
+#: Node of the networkx view that stands for all unobserved aspects.
+COLLECTION_NODE = "collection"
+
+
+#: (source aspect, action, target aspect), all by index.
+Edge: TypeAlias = tuple[int, int, int]
+
+
+class AspectTransitionGraph:
+    """What is known of one object: aspects with their patterns, and counted transitions between them.
+
+    All aspects not yet observed are one *collection node* of size |G| − n.
+
+    Attributes:
+        name: The object's name, unique in a memory.
+        assumptions: What is taken for granted of every object.
+    """
+
+    def __init__(self, name: str, assumptions: Assumptions) -> None:
+        if not isinstance(name, str) or not name:
+            raise InvalidInputError(f"name of an ATG: {name!r}; expected a text that is not empty")
+        self.name = name
+        self.assumptions = assumptions
+        self._aspect_of: dict[int, int] = {}
+        self._counts: dict[Edge, int] = {}
+        self._count_table: IntArray | None = None
+
+    @property
+    def n_known(self) -> int:
+        """n, the number of known aspects."""
+        return len(self._aspect_of)
+
+    @property
+    def n_unobserved(self) -> int:
+        """M = |G| − n, the size of the collection node; 0 when the node has ceased to be."""
+        return self.assumptions.n_aspects - self.n_known
+
+    @property
+    def aspects(self) -> tuple[Pattern, ...]:
+        """The pattern of each known aspect, in the order they were observed."""
+        return tuple(self.assumptions.alphabet.patterns[index] for index in self._aspect_of)
+
+    @property
+    def pattern_indices(self) -> tuple[int, ...]:
+        """The index in the alphabet of each known aspect's pattern."""
+        return tuple(self._aspect_of)
+
+    @property
+    def counts(self) -> dict[Edge, int]:
+        """c(x, a, y): how often each transition was observed."""
+        return dict(self._counts)
+
+    @property
+    def n_counted(self) -> int:
+        """How many different transitions were observed."""
+        return len(self._counts)
+
+    @property
+    def count_table(self) -> IntArray:
+        """(source, action, target, count) of each observed transition, shape [E, 4]; not to be written to."""
+        if self._count_table is None:
+            # Every trial asks every graph for it, but teaches one of them.
+            rows = [(*edge, count) for edge, count in self._counts.items()]
+            self._count_table = np.array(rows, dtype=np.int64).reshape(-1, 4)
+            self._count_table.flags.writeable = False
+        return self._count_table
+
+    def aspect_showing(self, pattern: int) -> int | None:
+        """Return the known aspect that shows the pattern of this index, or ``None``."""
+        return self._aspect_of.get(pattern)
+
+    def add_aspect(self, pattern: Sequence[int]) -> int:
+        """Add a newly observed aspect and return its index.
+
+        Raises:
+            InvalidInputError: The pattern is malformed or known already, or all |G| aspects are known.
+        """
+        index = self.assumptions.alphabet.index(pattern)
+        if index in self._aspect_of:
+            raise InvalidInputError(f"{self.name}: pattern {list(pattern)!r} is repeated; expected unique patterns")
+        if self.n_unobserved == 0:
+            raise InvalidInputError(
+                f"{self.name}: {self.n_known + 1} aspects; expected at most n_aspects = {self.assumptions.n_aspects}"
+            )
+        self._aspect_of[index] = self.n_known
+        return self.n_known - 1
+
+    def add_transition(self, source: int, action: int, target: int, count: int = 1) -> None:
+        """Count ``count`` more observations of a transition between known aspects.
+
+        Raises:
+            InvalidInputError: An aspect or action that is not there, or a count below one.
+        """
+        for role, aspect in (("source", source), ("target", target)):
+            if isinstance(aspect, bool) or not isinstance(aspect, int) or not 0 <= aspect < self.n_known:
+                raise InvalidInputError(
+                    f"{self.name}: {role} aspect {aspect!r}; expected 0 to {self.n_known - 1}"
+                    if self.n_known
+                    else f"{self.name}: {role} aspect {aspect!r}; expected no transition, since no aspect is known"
+                )
+        if isinstance(action, bool) or not isinstance(action, int) or not 0 <= action < len(self.assumptions.actions):
+            raise InvalidInputError(
+                f"{self.name}: action {action!r}; expected 0 to {len(self.assumptions.actions) - 1}"
+            )
+        if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MAX_NUMBER:
+            raise InvalidInputError(f"{self.name}: count {count!r}; expected a whole number from 1 to 2^53")
+        edge = (source, action, target)
+        self._counts[edge] = self._counts.get(edge, 0) + count
+        self._count_table = None
+
+    def learn(self, patterns: Sequence[int | None], actions: Sequence[int]) -> None:
+        """Extend the graph by what a trial showed.
+
+        A node for each newly seen complete pattern, and one more count for each transition between two
+        successive complete patterns; a full graph takes no further aspects.
+
+        Args:
+            patterns: Index of the pattern seen at each time, ``None`` where it was not complete, length t + 1.
+            actions: Index of the action between each two, length t.
+        """
+        if len(patterns) != len(actions) + 1:
+            raise InvalidInputError(
+                f"{self.name}: {len(patterns)} observations, {len(actions)} actions; expected one observation more"
+            )
+        n_patterns = len(self.assumptions.alphabet)
+        for pattern in patterns:
+            if pattern is not None and not 0 <= pattern < n_patterns:
+                raise InvalidInputError(
+                    f"{self.name}: pattern {pattern!r}; expected an index from 0 to {n_patterns - 1}"
+                )
+        aspects = [self._aspect_for(pattern) for pattern in patterns]
+        for source, action, target in zip(aspects, actions, aspects[1:], strict=False):
+            if source is not None and target is not None:
+                self.add_transition(source, action, target)
+
+    def absorb(self, other: AspectTransitionGraph) -> None:
+        """Add the aspects and counts of another graph; a full graph takes no further aspects, nor what leads to them.
+
+        Raises:
+            InvalidInputError: It was made under other assumptions.
+        """
+        if other.assumptions != self.assumptions:
+            raise InvalidInputError(f"{self.name}: {other.name!r} was made under other assumptions")
+        aspects = [self._aspect_for(pattern) for pattern in other.pattern_indices]
+        for (source, action, target), count in other.counts.items():
+            start, end = aspects[source], aspects[target]
+            if start is not None and end is not None:
+                self.add_transition(start, action, end, count)
+
+    def _aspect_for(self, pattern: int | None) -> int | None:
+        if pattern is None:
+            return None
+        if pattern not in self._aspect_of and self.n_unobserved > 0:
+            return self.add_aspect(self.assumptions.alphabet.patterns[pattern])
+        return self._aspect_of.get(pattern)
+
+    def unknown_transitions(self) -> Iterable[tuple[int, int]]:
+        """Yield each (known aspect, action) never tried: the dotted edges of Figure 1."""
+        tried = {(source, action) for source, action, _ in self._counts}
+        for aspect in range(self.n_known):
+            for action in range(len(self.assumptions.actions)):
+                if (aspect, action) not in tried:
+                    yield aspect, action
+
+    def to_networkx(self) -> networkx.MultiDiGraph[int | str]:
+        """Return the graph for networkx.
+
+        Nodes are the known aspects, by index, with attribute ``pattern``, and ``COLLECTION_NODE`` with
+        attribute ``size`` while aspects are unobserved. Edges carry ``action``, ``count`` and ``observed``;
+        an unknown transition is drawn to the collection node with count 0.
+        """
+        graph: networkx.MultiDiGraph[int | str] = networkx.MultiDiGraph(name=self.name)
+        for aspect, pattern in enumerate(self.aspects):
+            graph.add_node(aspect, pattern=pattern)
+        for (source, action, target), count in sorted(self._counts.items()):
+            name = self.assumptions.actions[action]
+            graph.add_edge(source, target, key=name, action=name, count=count, observed=True)
+        if self.n_unobserved:
+            graph.add_node(COLLECTION_NODE, size=self.n_unobserved)
+            for aspect, action in self.unknown_transitions():
+                name = self.assumptions.actions[action]
+                graph.add_edge(aspect, COLLECTION_NODE, key=name, action=name, count=0, observed=False)
+        return graph
+
+    def copy(self) -> AspectTransitionGraph:
+        """Return a graph that can be extended without touching this one."""
+        twin = AspectTransitionGraph(self.name, self.assumptions)
+        twin._aspect_of = dict(self._aspect_of)
+        twin._counts = dict(self._counts)
+        return twin
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, AspectTransitionGraph):
+            return NotImplemented
+        return (self.name, self.assumptions, self.aspects, self._counts) == (
+            other.name,
+            other.assumptions,
+            other.aspects,
+            other._counts,
+        )
+
+    __hash__ = None  # type: ignore[assignment]  # mypy's usual complaint; graphs grow, so they are no keys
+
+    def _repr_html_(self) -> str:
+        return graph_view(self)._repr_html_()
+
+    def __repr__(self) -> str:
+        return (
+            f"AspectTransitionGraph({self.name!r}, {self.n_known} of {self.assumptions.n_aspects} aspects, "
+            f"{len(self._counts)} observed edges)"
+        )
+
+
+#: Rows that are shown of a long table.
+_ASPECTS: Final = 24
+
+
+def graph_view(graph: AspectTransitionGraph) -> HtmlTable:
+    """Return a table of the known aspects, and of where each action was seen to lead."""
+    assumptions, aspects = graph.assumptions, graph.aspects
+    ways: dict[tuple[int, int], list[str]] = {}
+    for (source, action, target), count in sorted(graph.counts.items()):
+        times = "" if count == 1 else f" ×{count}"
+        ways.setdefault((source, action), []).append(f"{_symbols(aspects[target])}{times}")
+    rows: list[tuple[Cell, ...]] = [
+        (
+            _symbols(pattern),
+            *("; ".join(ways.get((aspect, action), ["·"])) for action in range(len(assumptions.actions))),
+        )
+        for aspect, pattern in enumerate(aspects)
+    ]
+    title = f"{graph.name}: {graph.n_known} of {assumptions.n_aspects} aspects, {len(graph.counts)} observed edges"
+    headings = (f"aspect ({', '.join(assumptions.alphabet.slots)})", *assumptions.actions)
+    note = f"· not yet tried; collection node: {graph.n_unobserved} unobserved"
+    return HtmlTable(title, headings if rows else (), shortened(rows, _ASPECTS, "aspects"), note)

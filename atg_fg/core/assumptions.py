@@ -1,0 +1,62 @@
+"""What the robot takes for granted before it meets any object (section 3 of the paper)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.patterns import PatternAlphabet
+
+#: Whole numbers up to here are exact as floating-point numbers.
+MAX_NUMBER = 2**53
+
+
+@dataclass(frozen=True)
+class Assumptions:
+    """How many objects and aspects there are, what the robot can do and what it can see.
+
+    Attributes:
+        n_objects: |O|, the objects that exist in the environment.
+        n_aspects: |G|, the aspects of each object; at most |𝒵|.
+        actions: Names of the actions, all different.
+        alphabet: The patterns one aspect can show.
+
+    Raises:
+        InvalidInputError: A number below one, no or repeated actions, or |G| > |𝒵|.
+    """
+
+    n_objects: int
+    n_aspects: int
+    actions: tuple[str, ...]
+    alphabet: PatternAlphabet
+
+    def __post_init__(self) -> None:
+        for field in ("n_objects", "n_aspects"):
+            value = getattr(self, field)
+            if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= MAX_NUMBER:
+                raise InvalidInputError(f"{field}: {value!r}; expected a whole number from 1 to 2^53")
+        if isinstance(self.actions, str) or not all(isinstance(name, str) for name in self.actions):
+            raise InvalidInputError(f"actions: {self.actions!r}; expected a tuple of names")
+        if not self.actions or len(set(self.actions)) != len(self.actions):
+            raise InvalidInputError(f"actions: {list(self.actions)!r}; expected at least one name, all different")
+        if self.n_aspects > len(self.alphabet):
+            raise InvalidInputError(
+                f"n_aspects: {self.n_aspects}; expected at most the {len(self.alphabet)} patterns there are, "
+                "since the aspects of one object are unique"
+            )
+
+    def action_index(self, name: str, place: str = "action") -> int:
+        """Return the index of an action, or raise ``InvalidInputError`` naming ``place``."""
+        if not isinstance(name, str) or name not in self.actions:
+            raise InvalidInputError(f"{place}: {name!r}; expected one of: {', '.join(self.actions)}")
+        return self.actions.index(name)
+
+
+def arcube_assumptions(n_objects: int = 100) -> Assumptions:
+    """Return the paper's assumptions: ARcubes with 24 aspects, 12 tags, three actions (section 5)."""
+    return Assumptions(
+        n_objects=n_objects,
+        n_aspects=24,
+        actions=("flip", "left", "right"),
+        alphabet=PatternAlphabet(slots=("front", "top"), n_symbols=12),
+    )

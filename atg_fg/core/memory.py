@@ -1,0 +1,215 @@
+"""The robot memory ℳ: the ATGs of all objects judged novel so far (section 3 of the paper)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from typing import Final
+
+from atg_fg.core.aspect_graph import AspectTransitionGraph
+from atg_fg.core.assumptions import Assumptions
+from atg_fg.core.errors import InvalidInputError, unknown_name
+from atg_fg.core.merging import Merge, check_merges
+from atg_fg.core.patterns import Detection
+from atg_fg.core.table import Bar, Cell, HtmlTable
+from atg_fg.core.transactions import Persistent, one_transaction
+
+
+class RobotMemory(Persistent):
+    """ATGs by name, in the order they were made, under one set of assumptions.
+
+    Args:
+        assumptions: |O|, |G|, actions and alphabet.
+        graphs: ATGs under the same assumptions, with unique names.
+        merges: Those that led to these graphs, in their order.
+
+    Raises:
+        InvalidInputError: A repeated name, a graph made under other assumptions, or merges that lead to others.
+    """
+
+    def __init__(
+        self,
+        assumptions: Assumptions,
+        graphs: Iterable[AspectTransitionGraph] = (),
+        merges: Iterable[Merge] = (),
+    ) -> None:
+        self.assumptions = assumptions
+        self._graphs: dict[str, AspectTransitionGraph] = {}
+        self._merges: list[Merge] = []
+        for graph in graphs:
+            self.add(graph)
+        self._merges = list(merges)
+        check_merges(self._merges, self._graphs, "merges")
+
+    @one_transaction
+    def add(self, graph: AspectTransitionGraph) -> None:
+        """Add the ATG of a novel object.
+
+        Raises:
+            InvalidInputError: The name is taken, or the assumptions differ.
+        """
+        if graph.name in self._graphs or graph.name in self._dropped:
+            raise InvalidInputError(f"memory: name {graph.name!r} is repeated; expected unique names")
+        if graph.assumptions != self.assumptions:
+            raise InvalidInputError(f"memory: {graph.name!r} was made under other assumptions than this memory")
+        self._graphs[graph.name] = graph
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the remembered objects; object index i is the i-th of them."""
+        return tuple(self._graphs)
+
+    @property
+    def n_unseen(self) -> int:
+        """U = max(|O| − K, 1), the number of objects never met."""
+        return max(self.assumptions.n_objects - len(self), 1)
+
+    @one_transaction
+    def learn(self, patterns: Sequence[int | None], actions: Sequence[int], matched: str | None) -> str:
+        """Learn from a trial and return the name of the ATG it went to.
+
+        Args:
+            patterns: Index of the pattern seen at each time, ``None`` where it was not complete, length t + 1.
+            actions: Index of the action between each two, length t.
+            matched: Name of the ATG to extend, or ``None`` if the object was judged novel.
+        """
+        graph = AspectTransitionGraph(self._new_name(), self.assumptions) if matched is None else self[matched].copy()
+        graph.learn(patterns, actions)
+        self._graphs[graph.name] = graph
+        return graph.name
+
+    def learn_shared(self, name: str, detections: Sequence[Detection], actions: Sequence[int]) -> None:
+        """Learn from a raw trial what all objects share: nothing, in a memory that takes each object by itself.
+
+        Args:
+            name: Name of the ATG that the trial went to.
+            detections: The symbol in each slot at each look, ``None`` where nothing was seen, length t + 1.
+            actions: Index of the action between each two, length t.
+        """
+
+    def _new_name(self) -> str:
+        number = len(self)
+        while f"object-{number:03d}" in self._graphs or f"object-{number:03d}" in self._dropped:
+            number += 1
+        return f"object-{number:03d}"
+
+    @property
+    def merges(self) -> tuple[Merge, ...]:
+        """What was merged and not undone, in its order."""
+        return tuple(self._merges)
+
+    @property
+    def _dropped(self) -> list[str]:
+        """Names of ATGs that were merged into others; they are kept free for undoing it."""
+        return [merge.dropped.name for merge in self._merges]
+
+    @one_transaction
+    def merge(self, keep: str, drop: str) -> Merge:
+        """Make one ATG of two that were made from one object; return the record that ``unmerge`` goes by.
+
+        Args:
+            keep: Name of an ATG, which the merged one has.
+            drop: Name of another one, which is no more.
+
+        Raises:
+            UnknownNameError: There is no such ATG.
+            InvalidInputError: Both are the same.
+        """
+        if keep == drop:
+            raise InvalidInputError(f"merge: {keep!r} with itself; expected two ATGs")
+        kept, dropped = self[keep].copy(), self[drop].copy()
+        merge = Merge(kept, dropped, self.names.index(drop), self._merge_shared(keep, drop))
+        self._graphs[keep] = merge.merged()
+        del self._graphs[drop]
+        self._merges.append(merge)
+        return merge
+
+    @one_transaction
+    def unmerge(self, name: str) -> None:
+        """Undo a merge: both ATGs are as they were; what was learned since stays with the one that was kept.
+
+        If merges are undone in reverse order and nothing was learned since, the memory is exactly as it was before.
+
+        Args:
+            name: Of the ATG that was dropped.
+
+        Raises:
+            UnknownNameError: No ATG of this name was merged into another.
+            InvalidInputError: The ATG that it was merged into has taken part in a later merge, to be undone first.
+        """
+        if name not in self._dropped:
+            raise unknown_name("unmerge", name, self._dropped)
+        number = self._dropped.index(name)
+        merge = self._merges[number]
+        for later in self._merges[number + 1 :]:
+            if merge.kept.name in (later.kept.name, later.dropped.name):
+                raise InvalidInputError(
+                    f"unmerge: {name!r}; expected {later.dropped.name!r}, which was merged later, to be undone first"
+                )
+        graphs = list(self._graphs.items())
+        graphs.insert(merge.position, (name, merge.dropped.copy()))
+        self._graphs = dict(graphs)
+        self._graphs[merge.kept.name] = merge.undone(self[merge.kept.name])
+        del self._merges[number]
+        self._unmerge_shared(merge)
+
+    def _merge_shared(self, keep: str, drop: str) -> tuple[int, ...]:
+        """Let what all objects share know of a merge; return the numbers of the raw trials that were of ``drop``."""
+        return ()
+
+    def _unmerge_shared(self, merge: Merge) -> None:
+        """Let what all objects share know that a merge was undone."""
+
+    def become(self, other: RobotMemory) -> None:
+        """Have the ATGs and merges of another memory, under the same assumptions, instead of one's own."""
+        self._graphs, self._merges = dict(other._graphs), list(other._merges)
+
+    def copy(self) -> RobotMemory:
+        """Return a memory that can learn without touching this one."""
+        return RobotMemory(self.assumptions, (graph.copy() for graph in self), self._merges)
+
+    def __getitem__(self, name: str) -> AspectTransitionGraph:
+        try:
+            return self._graphs[name]
+        except KeyError:
+            raise unknown_name("memory", name, self._graphs) from None
+
+    def __len__(self) -> int:
+        """K, the number of remembered objects."""
+        return len(self._graphs)
+
+    def __iter__(self) -> Iterator[AspectTransitionGraph]:
+        return iter(self._graphs.values())
+
+    def __eq__(self, other: object) -> bool:
+        if not isinstance(other, RobotMemory):
+            return NotImplemented
+        return (self.assumptions, list(self), self.merges) == (other.assumptions, list(other), other.merges)
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def _repr_html_(self) -> str:
+        return memory_view(self)._repr_html_()
+
+    def __repr__(self) -> str:
+        return f"RobotMemory({len(self)} of {self.assumptions.n_objects} objects)"
+
+
+_OBJECTS: Final = 12
+
+
+def memory_view(memory: RobotMemory, more: str = "") -> HtmlTable:
+    """Return a table of the remembered objects, with ``more`` to be said below it."""
+    assumptions = memory.assumptions
+    rows: list[tuple[Cell, ...]] = []
+    # The last ones are not looked at: a memory may hold very many.
+    for _, graph in zip(range(_OBJECTS), memory, strict=False):
+        aspects = Bar(graph.n_known / assumptions.n_aspects, f"{graph.n_known} of {assumptions.n_aspects}")
+        rows.append((graph.name, aspects, str(len(graph.counts)), str(sum(graph.counts.values()))))
+    if len(memory) > len(rows):
+        rows.append((f"… and {len(memory) - len(rows)} other objects", "", "", ""))
+    title = f"Robot memory: {len(memory)} of {assumptions.n_objects} objects"
+    headings = ("object", "known aspects", "edges", "seen, times") if rows else ()
+    merged = f"; {len(memory.merges)} merged into others" if memory.merges else ""
+    slots = f"{', '.join(assumptions.alphabet.slots)} of {assumptions.alphabet.n_symbols} symbols"
+    note = f"actions {', '.join(assumptions.actions)}; slots {slots}{merged}{more}"
+    return HtmlTable(title, headings, tuple(rows), note)

@@ -1,0 +1,49 @@
+"""Parameters of the recognition model."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from atg_fg.core.errors import InvalidInputError
+
+
+@dataclass(frozen=True)
+class ModelParameters:
+    """How much noise the model assumes, and whether it learns while a trial goes on.
+
+    Attributes:
+        transition_concentration: α ≥ 0, the Dirichlet concentration that the base distribution has
+            beside the counted transitions.
+        observation_noise: 0 ≤ δ < 1, the probability that a look shows a pattern drawn uniformly.
+        learn_in_trial: Extend every hypothesis, *unseen* too, as the trial goes.
+        learn_structure: Objects may follow one structure that all share, learned from all trials; only the engine
+            ``learned-structure`` knows of it, and the memory has to be a ``StructuredMemory``.
+
+    Raises:
+        InvalidInputError: A value out of its range or not finite.
+    """
+
+    transition_concentration: float = 1e-8
+    observation_noise: float = 1e-8
+    learn_in_trial: bool = True
+    learn_structure: bool = False
+
+    def __post_init__(self) -> None:
+        alpha, delta = self.transition_concentration, self.observation_noise
+        if not _is_finite_number(alpha) or alpha < 0:
+            raise InvalidInputError(f"transition_concentration: {alpha!r}; expected a finite number of at least 0")
+        if not _is_finite_number(delta) or not 0 <= delta < 1:
+            raise InvalidInputError(f"observation_noise: {delta!r}; expected a number from 0 to below 1")
+        for name in ("learn_in_trial", "learn_structure"):
+            if not isinstance(getattr(self, name), bool):
+                raise InvalidInputError(f"{name}: {getattr(self, name)!r}; expected true or false")
+
+
+def _is_finite_number(value: object) -> bool:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:  # a whole number too large for a float
+        return False

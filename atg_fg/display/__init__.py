@@ -1,0 +1,1 @@
+"""Plots, pictures, camera frames and the Rerun viewer."""

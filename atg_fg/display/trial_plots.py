@@ -1,0 +1,179 @@
+"""Figures of one trial: belief and entropy, action by action, and the ATG that it shows."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from atg_fg.core.aspect_graph import AspectTransitionGraph
+from atg_fg.core.belief import IdentityBelief
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.records import TrialRecord
+from atg_fg.display.atg_picture import draw_atg
+from atg_fg.display.figures import GREY, INK, PALETTE, plot_style
+from atg_fg.display.plot_parts import LineEnd, figure_with_axes, label_ends, legend_above, step_axis
+from atg_fg.display.trial_course import course_of
+from atg_fg.inference.interface import Inference
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+def plot_atg(shown: AspectTransitionGraph | TrialRecord | Inference, **options: Any) -> Figure:
+    """Draw an ATG like the paper's Figure 1.
+
+    Args:
+        shown: An ATG; or a trial, for the ATG of what it alone has shown, with the last aspect framed.
+        options: Keyword arguments of ``draw_atg``: ``symbol_images``, ``highlight``, ``path``.
+
+    Raises:
+        InvalidInputError: As for ``draw_atg``.
+        MissingDependencyError: matplotlib is not installed.
+    """
+    if isinstance(shown, AspectTransitionGraph):
+        return draw_atg(shown, **options)
+    course = course_of(shown)
+    graph = AspectTransitionGraph("what the trial showed", course.assumptions)
+    graph.learn(course.patterns, course.actions)
+    last = course.patterns[-1]
+    highlight = None if last is None else graph.aspect_showing(last)
+    return draw_atg(graph, **{"highlight": highlight, **options})
+
+
+def plot_belief(
+    trial: TrialRecord | Inference | Sequence[IdentityBelief], names: Sequence[str] | None = None, *, top: int = 5
+) -> Figure:
+    """Plot who the object may be, action by action.
+
+    Args:
+        trial: A trial; or the belief after each observation, the first before any action, length t + 1.
+        names: Name of each remembered object, length K; those of the trial if not given.
+        top: Draw this many objects at most: those whose final plus peak probability is highest.
+
+    Raises:
+        InvalidInputError: No beliefs, a belief over another number of objects, beliefs without names, or ``top`` below
+            one.
+        MissingDependencyError: matplotlib is not installed.
+    """
+    if isinstance(trial, (TrialRecord, Inference)):
+        course = course_of(trial)
+        beliefs: Sequence[IdentityBelief] = course.beliefs
+        names = course.names if names is None else names
+    else:
+        beliefs = trial
+    if names is None:
+        raise InvalidInputError("names: none given with beliefs; expected one for each remembered object")
+    _check_beliefs(beliefs, names, top)
+    steps = np.arange(len(beliefs))
+    objects = np.array([belief.objects for belief in beliefs]).reshape(len(beliefs), len(names))
+    unseen = np.array([belief.unseen for belief in beliefs])
+    order = np.argsort(-(objects[-1] + objects.max(axis=0)), kind="stable")[:top]
+    with plot_style():
+        figure, axes = figure_with_axes(7.2, 3.9)
+        axes.axhline(0.5, color=GREY, linewidth=1, linestyle=(0, (2, 2)), zorder=1)
+        ends = [
+            LineEnd(float(unseen[-1]), f"unseen {unseen[-1]:.2f}", INK, "bold italic"),
+            LineEnd(0.5, "novel if unseen is above", GREY, "small"),
+        ]
+        for rank, index in enumerate(order):
+            color = PALETTE[rank % len(PALETTE)]
+            dashes = "solid" if rank < len(PALETTE) else "dashed"
+            axes.plot(steps, objects[:, index], color=color, linestyle=dashes, marker="o", markersize=3.5)
+            ends.append(LineEnd(float(objects[-1, index]), f"{names[index]} {objects[-1, index]:.2f}", color))
+        axes.plot(steps, unseen, color=INK, linewidth=2.6, marker="o", markersize=4)
+        axes.set(ylim=(-0.02, 1.02), ylabel="probability")
+        step_axis(axes, len(beliefs))
+        label_ends(axes, ends)
+        axes.set_title("Belief over identity")
+    return figure
+
+
+def plot_entropy(
+    trial: TrialRecord | Inference | Sequence[float],
+    expected: Sequence[Mapping[str, float]] = (),
+    chosen: Sequence[str] = (),
+) -> Figure:
+    """Plot H(O) after each action beside what the planner expected of every action.
+
+    Args:
+        trial: A trial, and then nothing else; or H(O) in nats after each observation, the first before any action,
+            length t + 1.
+        expected: Expected entropy in nats of each action before it was taken, by name, length t; a policy
+            that does not plan has an empty mapping.
+        chosen: Name of the action taken, length t.
+
+    Raises:
+        InvalidInputError: Lengths that do not fit, or a chosen action nothing was expected of.
+        MissingDependencyError: matplotlib is not installed.
+    """
+    if isinstance(trial, (TrialRecord, Inference)):
+        if expected or chosen:
+            raise InvalidInputError("expected, chosen: given with a trial; expected none, since the trial has its own")
+        course = course_of(trial)
+        entropies: Sequence[float] = [belief.entropy for belief in course.beliefs]
+        expected, chosen = course.expected, course.chosen
+    else:
+        entropies = trial
+    _check_entropies(entropies, expected, chosen)
+    actions = list(dict.fromkeys(action for options in expected for action in options))
+    with plot_style():
+        figure, axes = figure_with_axes(7.8, 4.1)
+        axes.plot(range(len(entropies)), entropies, color="#555555", marker="o", markersize=4, label="entropy H(O)")
+        for rank, action in enumerate(actions):
+            _plot_expected(axes, rank, len(actions), action, expected, chosen)
+        if actions:
+            axes.plot([], [], "o", markersize=7, color=GREY, label="chosen (filled)")
+        axes.set(ylabel="entropy (nats)")
+        axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
+        step_axis(axes, len(entropies))
+        legend_above(axes)
+        axes.set_title("Entropy of identity, and what each action was expected to leave", pad=28)
+    return figure
+
+
+def _plot_expected(
+    axes: Axes,
+    rank: int,
+    n_actions: int,
+    action: str,
+    expected: Sequence[Mapping[str, float]],
+    chosen: Sequence[str],
+) -> None:
+    """Mark what one action was expected to leave, just left of its outcome and apart from the others."""
+    color, shape = PALETTE[rank % len(PALETTE)], "s^Dvp*"[rank % 6]
+    shift = 0.16 + 0.5 * (n_actions - 1 - rank) / max(n_actions, 3)
+    for taken in (False, True):
+        steps = [t for t, options in enumerate(expected) if action in options and (chosen[t] == action) == taken]
+        axes.plot(
+            [t + 1 - shift for t in steps], [expected[t][action] for t in steps], shape, zorder=4,
+            markersize=7 if taken else 5, markeredgecolor=color, markerfacecolor=color if taken else "white",
+            label=None if taken else action,
+        )  # fmt: skip
+
+
+def _check_beliefs(beliefs: Sequence[IdentityBelief], names: Sequence[str], top: int) -> None:
+    if not beliefs:
+        raise InvalidInputError("beliefs: none given; expected at least one")
+    for step, belief in enumerate(beliefs):
+        if len(belief.objects) != len(names):
+            raise InvalidInputError(
+                f"beliefs[{step}]: {len(belief.objects)} objects; expected one for each of {len(names)} names"
+            )
+    if isinstance(top, bool) or not isinstance(top, int) or top < 1:
+        raise InvalidInputError(f"top: {top!r}; expected a whole number of at least 1")
+
+
+def _check_entropies(
+    entropies: Sequence[float], expected: Sequence[Mapping[str, float]], chosen: Sequence[str]
+) -> None:
+    if not len(entropies) == len(expected) + 1 == len(chosen) + 1:
+        raise InvalidInputError(
+            f"entropies: {len(entropies)} with {len(expected)} expected and {len(chosen)} chosen; "
+            "expected one entropy more than actions"
+        )
+    for step, (options, action) in enumerate(zip(expected, chosen, strict=True)):
+        if options and action not in options:
+            raise InvalidInputError(f"chosen[{step}]: {action!r}; expected one of: {', '.join(options)}")

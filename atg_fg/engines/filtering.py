@@ -1,0 +1,83 @@
+"""What every inference engine offers, and the part that most of them share."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import NamedTuple
+
+import numpy as np
+
+from atg_fg.core.belief import IdentityBelief
+from atg_fg.core.log_math import log_of
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.patterns import FloatArray
+from atg_fg.inference.interface import Inference
+from atg_fg.inference.recognition_model import Revelation, widened
+
+
+class _State(NamedTuple):
+    """A filter's state: ln p(O | z), shape [H], and p(X_t | O, z), shape [H, W]."""
+
+    log_identity: FloatArray
+    aspects: FloatArray
+
+
+class FilterInference(Inference):
+    """Engines that carry p(O, X_t | z_0:t) forward.
+
+    The belief is kept as ln p(O) and p(X_t | O). So an object that has been improbable for a thousand steps can come
+    back when the evidence turns, where a plain product would have underflowed to zero.
+    """
+
+    def __init__(self, memory: RobotMemory, parameters: ModelParameters, prior: IdentityBelief | None = None) -> None:
+        super().__init__(memory, parameters, prior)
+        self._belief = _State(log_of(self.model.prior), self.model.base)
+        self._log_evidence = 0.0
+
+    def identity(self) -> IdentityBelief:
+        """Return p(O | z_0:t, a_1:t) (eq. 1 and 2)."""
+        probabilities = np.exp(self._belief.log_identity)
+        return IdentityBelief(probabilities[:-1], float(probabilities[-1]), self.model.n_unseen)
+
+    @property
+    def log_evidence(self) -> float:
+        """Return ln p(z_0:t | a_1:t)."""
+        return self._log_evidence
+
+    @property
+    def aspect_belief(self) -> FloatArray:
+        """p(O, X_t | z_0:t, a_1:t), shape [H, W]."""
+        return np.exp(self._belief.log_identity)[:, None] * self._belief.aspects
+
+    def _update(self, likelihood: FloatArray) -> None:
+        joint = self._correct(self._belief.aspects, likelihood)
+        given_object = joint.sum(axis=1)
+        possible = given_object > 0
+        log_joint = self._belief.log_identity + log_of(given_object)
+        peak = log_joint.max()
+        if not np.isfinite(peak):
+            raise self._impossible()
+        log_probability = float(peak + np.log(np.exp(log_joint - peak).sum()))
+        aspects = joint / np.where(possible, given_object, 1.0)[:, None]
+        if not possible.all():
+            # A hypothesis that is ruled out keeps its prediction; its weight is zero from here on.
+            aspects[~possible] = self._belief.aspects[~possible]
+        self._belief = _State(log_joint - log_probability, aspects)
+        self._log_evidence += log_probability
+
+    def _divide(self, revelation: Revelation) -> None:
+        aspects = widened(self._belief.aspects, self.model.n_states)
+        revelation.move(aspects)
+        self._belief = _State(self._belief.log_identity, aspects)
+
+    def _predict(self, action: int) -> None:
+        self._belief = _State(self._belief.log_identity, self._propagate(self._belief.aspects, action))
+
+    @abstractmethod
+    def _propagate(self, aspects: FloatArray, action: int) -> FloatArray:
+        """Return p(X_{t+1} | O, a, z_0:t) from p(X_t | O, z_0:t), both of shape [H, W]."""
+
+    @abstractmethod
+    def _correct(self, aspects: FloatArray, likelihood: FloatArray) -> FloatArray:
+        """Return p(X_t, z_t | O, z_0:t-1), shape [H, W]."""

@@ -1,0 +1,309 @@
+"""The Bayes filter of many hypotheses, each over its own aspects: rows of padded arrays, and lists of counted edges.
+
+It computes what ``atg_fg.inference.recognition_model`` says, without any table over objects and patterns. A row may
+also have *hidden* aspects: known ones that are told from each other by nothing that the trial has shown. Their mass is
+kept as one number, and what is not known of their edges is between the two extremes that the row is given
+(``docs/large_memories.md``).
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from atg_fg.core.assumptions import Assumptions
+from atg_fg.core.compact.columns import positions
+from atg_fg.core.compact.compact_memory import GraphArrays
+from atg_fg.core.log_math import log_of
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.patterns import Evidence, FloatArray, IntArray
+from atg_fg.inference.chain import History
+from atg_fg.inference.recognition_model import COLLECTION
+
+
+class Hidden(NamedTuple):
+    """Known aspects of each row that are kept as one, all arrays of shape [R].
+
+    Attributes:
+        number: How many they are.
+        stay: The share of their mass that takes part in the row's S = Σ_x b(x) stay(x).
+        keep: The share of their mass that goes from one of them to another by counted edges.
+    """
+
+    number: FloatArray
+    stay: FloatArray
+    keep: FloatArray
+
+
+class CountedEdges(NamedTuple):
+    """Counted transitions of all rows under one action, each once; a cell is row · W + state. All of shape [E]."""
+
+    source: IntArray
+    target: IntArray
+    counts: FloatArray
+    probability: FloatArray
+
+    def followed_by(self, other: CountedEdges) -> CountedEdges:
+        """Return the entries of both."""
+        return CountedEdges(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
+
+    def in_cells(self, width: int, new_width: int, first_row: int = 0) -> CountedEdges:
+        """Return the same edges where rows are ``new_width`` wide and begin at another one."""
+        if width == new_width and not first_row:
+            return self
+        source, target = ((cells // width + first_row) * new_width + cells % width for cells in self[:2])
+        return CountedEdges(source, target, self.counts, self.probability)
+
+
+class Looked(NamedTuple):
+    """What a look makes of a filter, before anything is changed.
+
+    Attributes:
+        mass: p(X_t | row, z_0:t), shape [R, W]; the prediction where the row is ruled out.
+        hidden_mass: The same of the hidden aspects, shape [R].
+        log_weight: ln p(row, z_0:t), shape [R].
+    """
+
+    mass: FloatArray
+    hidden_mass: FloatArray
+    log_weight: FloatArray
+
+
+class AspectFilter:
+    """R hypotheses, with A actions; state 0 of a row is its collection node, state 1 + k its k-th listed aspect.
+
+    Args:
+        assumptions: |G|, actions and alphabet.
+        parameters: α, δ and whether to learn within the trial.
+        graphs: The known aspects and transitions of each row; no aspects where they are hidden.
+        log_weight: ln of the prior weight of each row, shape [R].
+        hidden: The hidden aspects of each row, if there are any.
+
+    Attributes:
+        n_known: n of each row, the hidden ones included, shape [R].
+        listed_rows: Row of each listed aspect, shape [L].
+        listed_patterns: Pattern of each listed aspect, shape [L].
+        pattern: The same by state, shape [R, W]; −1 for collection nodes and padding.
+        mass: p(X_t | row), shape [R, W].
+        hidden_mass: p(X_t is hidden | row), shape [R].
+        log_weight: ln p(row, z_0:t), shape [R].
+        stay: α/(c + α) of each aspect under each action, shape [A, R, W].
+        edges: The counted transitions by action.
+    """
+
+    def __init__(
+        self,
+        assumptions: Assumptions,
+        parameters: ModelParameters,
+        graphs: GraphArrays,
+        log_weight: FloatArray,
+        hidden: Hidden | None = None,
+    ) -> None:
+        self.parameters = parameters
+        self.n_patterns = len(assumptions.alphabet)
+        self.n_aspects = assumptions.n_aspects
+        n_rows, listed = len(log_weight), graphs.n_known.astype(np.int64)
+        self.hidden = hidden or Hidden(*(np.zeros(n_rows) for _ in range(3)))
+        self.n_known = listed + self.hidden.number.astype(np.int64)
+        self.log_weight = log_weight
+        width = 1 + int(listed.max(initial=0))
+        self.pattern = np.full((n_rows, width), -1, dtype=np.int32)
+        states = positions(np.arange(n_rows) * width + 1, listed)
+        self.pattern.ravel()[states] = graphs.patterns
+        self.listed_rows = np.repeat(np.arange(n_rows), listed)
+        self.listed_patterns = graphs.patterns.astype(np.int64)
+        self.mass = np.where(self.pattern >= 0, 1.0 / self.n_aspects, 0.0)
+        self.mass[:, COLLECTION] = self.n_unobserved / self.n_aspects
+        self.hidden_mass = self.hidden.number / self.n_aspects
+        self._count_edges(graphs, len(assumptions.actions))
+
+    def _count_edges(self, graphs: GraphArrays, n_actions: int) -> None:
+        alpha, width = self.parameters.transition_concentration, self.width
+        rows = np.repeat(np.arange(self.n_rows), graphs.n_edges.astype(np.int64))
+        source, target = rows * width + graphs.source + 1, rows * width + graphs.target + 1
+        count = graphs.counts.astype(np.float64)
+        self.stay = np.ones((n_actions, self.n_rows, width))
+        self.edges: list[CountedEdges] = []
+        for action in range(n_actions):
+            chosen = np.flatnonzero(graphs.action == action)
+            from_cell, counted = source[chosen], count[chosen]
+            totals = np.bincount(from_cell, counted, self.pattern.size)
+            has = totals > 0
+            self.stay[action].ravel()[has] = alpha / (totals[has] + alpha)
+            probability = counted / (totals[from_cell] + alpha)
+            self.edges.append(CountedEdges(from_cell, target[chosen], counted, probability))
+
+    @property
+    def n_rows(self) -> int:
+        """R."""
+        return self.pattern.shape[0]
+
+    @property
+    def width(self) -> int:
+        """W."""
+        return self.pattern.shape[1]
+
+    @property
+    def n_unobserved(self) -> IntArray:
+        """G − n of each row, shape [R]."""
+        unobserved: IntArray = self.n_aspects - self.n_known
+        return unobserved
+
+    @property
+    def unknown_rate(self) -> FloatArray:
+        """p(z | C) without noise of each pattern that the row does not know, shape [R]."""
+        n_unknown = np.maximum(self.n_patterns - self.n_known, 1)
+        return np.where(self.n_unobserved > 0, (1.0 - self.parameters.observation_noise) / n_unknown, 0.0)
+
+    def arrivals(self, action: int, mass: FloatArray) -> FloatArray:
+        """Return what counted edges carry to each state under an action, shape [R, W]."""
+        edges = self.edges[action]
+        carried = mass.ravel()[edges.source] * edges.probability
+        return np.bincount(edges.target, carried, mass.size).astype(np.float64).reshape(mass.shape)
+
+    def predict(self, action: int) -> None:
+        """Take in an action."""
+        kept = np.einsum("rw,rw->r", self.mass, self.stay[action]) + self.hidden.stay * self.hidden_mass
+        predicted = self.arrivals(action, self.mass)
+        np.add(predicted, (kept / self.n_aspects)[:, None], out=predicted, where=self.pattern >= 0)
+        predicted[:, COLLECTION] = kept * (self.n_unobserved / self.n_aspects)
+        self.mass = predicted
+        self.hidden_mass = kept * (self.hidden.number / self.n_aspects) + self.hidden.keep * self.hidden_mass
+
+    def looked(self, evidence: Evidence) -> Looked:
+        """Return what a look makes of this filter; hidden aspects show no pattern that it allows."""
+        delta, likelihood = self.parameters.observation_noise, evidence.likelihood
+        noise = delta / self.n_patterns * likelihood.sum()
+        mass = self.mass * noise
+        if not is_complete(evidence):
+            listed = self.pattern >= 0
+            shown = np.where(listed, likelihood[self.pattern], 0.0)
+            unknown = likelihood.sum() - shown.sum(axis=1)
+            # Subtraction leaves rounding errors where nothing is left.
+            left = np.count_nonzero(likelihood) - np.count_nonzero(shown, axis=1)
+            unknown = np.where(left > 0, np.maximum(unknown, 0.0), 0.0)
+            mass += self.mass * ((1.0 - delta) * shown)
+        else:
+            rows, states = np.nonzero(self.pattern == evidence.pattern)
+            weight = likelihood.sum()
+            unknown = np.full(self.n_rows, weight)
+            unknown[rows] = 0.0
+            mass[rows, states] += self.mass[rows, states] * ((1.0 - delta) * weight)
+        mass[:, COLLECTION] = self.mass[:, COLLECTION] * (self.unknown_rate * unknown + noise)
+        hidden_mass = self.hidden_mass * noise
+        total = mass.sum(axis=1) + hidden_mass
+        log_weight = self.log_weight + log_of(total)
+        possible = total > 0
+        divisor = np.where(possible, total, 1.0)
+        mass /= divisor[:, None]
+        hidden_mass /= divisor
+        if not possible.all():
+            mass[~possible], hidden_mass[~possible] = self.mass[~possible], self.hidden_mass[~possible]
+        return Looked(mass, hidden_mass, log_weight)
+
+    def accept(self, looked: Looked) -> None:
+        """Take in a look."""
+        self.mass, self.hidden_mass, self.log_weight = looked
+
+    def learn(self, previous: int | None, action: int | None, pattern: int | None) -> None:
+        """Extend every row by what was just seen, as ``RecognitionModel.learn`` does."""
+        if not self.parameters.learn_in_trial or pattern is None:
+            return
+        self._reveal(pattern)
+        if previous is not None and action is not None:
+            self._count(previous, action, pattern)
+
+    def _reveal(self, pattern: int) -> None:
+        knows = (self.pattern == pattern).any(axis=1)
+        rows = np.flatnonzero(~knows & (self.n_known < self.n_aspects))
+        if not len(rows):
+            return
+        truth = self.unknown_rate[rows]
+        noise = self.parameters.observation_noise / self.n_patterns
+        last = self.n_known[rows] + 1 == self.n_aspects
+        shares = np.where(last, 1.0, truth / (truth + noise))
+        self.n_known[rows] += 1
+        states = self.n_known[rows] - self.hidden.number[rows].astype(np.int64)
+        self._widen(int(states.max()) + 1)
+        self.pattern[rows, states] = pattern
+        self.listed_rows = np.append(self.listed_rows, rows)
+        self.listed_patterns = np.append(self.listed_patterns, np.full(len(rows), pattern))
+        revealed = self.mass[rows, COLLECTION] * shares
+        self.mass[rows, states] = revealed
+        self.mass[rows, COLLECTION] -= revealed
+
+    def _widen(self, width: int) -> None:
+        old = self.width
+        if width <= old:
+            return
+        more = ((0, 0), (0, width - old))
+        self.pattern = np.pad(self.pattern, more, constant_values=-1)
+        self.mass = np.pad(self.mass, more)
+        self.stay = np.pad(self.stay, ((0, 0), *more), constant_values=1.0)
+        self.edges = [edges.in_cells(old, width) for edges in self.edges]
+
+    def _count(self, previous: int, action: int, pattern: int) -> None:
+        alpha = self.parameters.transition_concentration
+        n_cells = self.pattern.size
+        source_of, target_of = (self._cells_showing(shown) for shown in (previous, pattern))
+        rows = np.flatnonzero((source_of >= 0) & (target_of >= 0))
+        source, target = source_of[rows], target_of[rows]
+        edges = self.edges[action]
+        touched = np.zeros(n_cells, dtype=bool)
+        touched[source] = True
+        theirs = np.flatnonzero(touched[edges.source])
+        again = theirs[edges.target[theirs] == target_of[edges.source[theirs] // self.width]]
+        edges.counts[again] += 1.0
+        totals = np.bincount(edges.source[theirs], edges.counts[theirs], n_cells).astype(np.float64)
+        touched[edges.source[again]] = False
+        new = touched[source]
+        totals[source[new]] += 1.0
+        edges.probability[theirs] = edges.counts[theirs] / (totals[edges.source[theirs]] + alpha)
+        self.stay[action].ravel()[source] = alpha / (totals[source] + alpha)
+        first = source[new]
+        added = CountedEdges(first, target[new], np.ones(len(first)), 1.0 / (totals[first] + alpha))
+        self.edges[action] = edges.followed_by(added)
+
+    def _cells_showing(self, pattern: int) -> IntArray:
+        """Return the cell of each row that shows a pattern, −1 if none does, shape [R]."""
+        cells = np.full(self.n_rows, -1)
+        rows, states = np.nonzero(self.pattern == pattern)
+        cells[rows] = rows * self.width + states
+        return cells
+
+    def follow(self, history: History, since: int = 0) -> None:
+        """Go through a trial from its beginning, or from after its first ``since`` looks."""
+        for time, evidence in enumerate(history.evidence[since:], start=since):
+            if time:
+                self.predict(history.actions[time - 1])
+            self.accept(self.looked(evidence))
+            self.learn_from(history, time)
+        if history.awaits_evidence and history.actions:
+            self.predict(history.actions[-1])
+
+    def learn_from(self, history: History, time: int) -> None:
+        """Learn from the look at a time of a trial."""
+        if time:
+            self.learn(history.evidence[time - 1].pattern, history.actions[time - 1], history.evidence[time].pattern)
+        else:
+            self.learn(None, None, history.evidence[0].pattern)
+
+    def absorb(self, other: AspectFilter) -> None:
+        """Add the rows of a filter that has gone through the same trial."""
+        width = max(self.width, other.width)
+        self._widen(width)
+        other._widen(width)
+        first_row = self.n_rows
+        other.listed_rows = other.listed_rows + first_row
+        for name in ("listed_rows", "listed_patterns", "n_known", "pattern", "mass", "hidden_mass", "log_weight"):
+            setattr(self, name, np.concatenate((getattr(self, name), getattr(other, name))))
+        self.hidden = Hidden(*(np.concatenate(pair) for pair in zip(self.hidden, other.hidden, strict=True)))
+        self.stay = np.concatenate((self.stay, other.stay), axis=1)
+        moved = [edges.in_cells(width, width, first_row) for edges in other.edges]
+        self.edges = [edges.followed_by(more) for edges, more in zip(self.edges, moved, strict=True)]
+
+
+def is_complete(evidence: Evidence) -> bool:
+    """Whether evidence allows one pattern alone, and says which."""
+    return evidence.pattern is not None and bool(evidence.likelihood[evidence.pattern] == evidence.likelihood.sum())

@@ -1,0 +1,79 @@
+"""The model's tables where they are asked for, and not before: for a large memory they are larger still."""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+from atg_fg.core.belief import IdentityBelief
+from atg_fg.core.errors import TooLargeError
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.inference.recognition_model import RecognitionModel, Revelation
+
+#: Objects times patterns, above which tables over both are refused.
+MAX_CELLS: Final = 5_000_000
+
+
+class TablesOnDemand(RecognitionModel):
+    """A ``RecognitionModel`` whose tables are made when one of them is first asked for.
+
+    Sizes and prior are there at once. Learning is put off until then.
+
+    Args:
+        memory: The robot memory when the trial begins.
+        parameters: α, δ and whether to learn within the trial.
+        prior: p(O) in place of the memory's.
+
+    Raises:
+        InvalidInputError: ``prior`` is not a distribution over the objects of this memory.
+        TooLargeError: On asking for a table, if there would be more than ``MAX_CELLS`` objects times patterns.
+    """
+
+    def __init__(self, memory: RobotMemory, parameters: ModelParameters, prior: IdentityBelief | None = None) -> None:
+        assumptions = memory.assumptions
+        self.memory = memory
+        self.parameters = parameters
+        self.n_actions = len(assumptions.actions)
+        self.n_aspects = assumptions.n_aspects
+        self.n_patterns = len(assumptions.alphabet)
+        self.n_unseen = memory.n_unseen
+        self.n_hypotheses = len(memory) + 1
+        if prior is None:
+            self.prior = IdentityBelief.uniform(len(memory), self.n_unseen).probabilities
+        else:
+            prior.check(len(memory), self.n_unseen)
+            self.prior = prior.probabilities / prior.probabilities.sum()
+        self._given = prior
+        self._put_off: list[tuple[int | None, int | None, int | None]] | None = []
+
+    def __getattr__(self, name: str) -> Any:
+        """Make all tables if one of them is asked for."""
+        put_off = self.__dict__.get("_put_off")
+        if put_off is None or name.startswith("__"):
+            raise AttributeError(name)
+        if self.n_hypotheses * self.n_patterns > MAX_CELLS:
+            raise TooLargeError(
+                f"tables over {self.n_hypotheses - 1} objects and {self.n_patterns} patterns; expected at most "
+                f"{MAX_CELLS} entries: ask for identity, expected entropies or smoothed aspects, or another engine"
+            )
+        self._put_off = None
+        super().__init__(self.memory, self.parameters, self._given)
+        for looked in put_off:
+            super().learn(*looked)
+        return getattr(self, name)
+
+    def learn(self, previous: int | None, action: int | None, pattern: int | None) -> Revelation | None:
+        """Extend every hypothesis by what was just seen, at once or when the tables are made.
+
+        Args:
+            previous: Pattern seen one step earlier, ``None`` if that look was not complete.
+            action: Action since then, ``None`` at the first step.
+            pattern: Pattern seen now, ``None`` if this look was not complete.
+
+        Returns:
+            How belief in the collection nodes is to be divided; ``None`` if no aspect is new, or learning is put off.
+        """
+        if self._put_off is None:
+            return super().learn(previous, action, pattern)
+        self._put_off.append((previous, action, pattern))
+        return None

@@ -1,0 +1,277 @@
+"""The paper's goal experiment (section 5): a memory is learned, then objects at stations are driven to goal aspects."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import zlib
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import closing
+from dataclasses import asdict, dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from atg_fg.core.assumptions import arcube_assumptions
+from atg_fg.core.belief import IdentityBelief
+from atg_fg.core.errors import InvalidInputError, unknown_name
+from atg_fg.core.goals import Goal
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.records import TrialRecord
+from atg_fg.engines import begin_trial, check_engine
+from atg_fg.experiments.executors.base import run_pieces
+from atg_fg.experiments.exploration import complete_memory, learned_memory
+from atg_fg.experiments.goal_scores import ServedObject, score, table_of_goals
+from atg_fg.experiments.trial import run_trial
+from atg_fg.inference.all_different import identity_given_others
+from atg_fg.policies import POLICIES, GoalPolicy, make_policy
+from atg_fg.policies.goal import PLANNERS, SETTLED, UNREACHABLE
+from atg_fg.storage.checked_json import plain_json
+from atg_fg.storage.plain_files import make_folder, write_bytes_atomically
+from atg_fg.storage.trial_log import check_not_begun, summary_of
+from atg_fg.worlds.arcube import ORIENTATIONS, make_arcubes, shown_pattern
+from atg_fg.worlds.base import World
+from atg_fg.worlds.registry import check_arcube_world
+from atg_fg.worlds.stations import AtStation, make_stations
+
+#: As ``learning_actions``: the memory knows all that there is to know.
+COMPLETE: Final = 0
+
+
+@dataclass(frozen=True)
+class GoalPlan:
+    """What one run of the goal experiment is made of.
+
+    Attributes:
+        world: Name of the world in which the goals are to be reached.
+        world_options: Passed on to it.
+        engine: Name of the inference engine.
+        parameters: α, δ and whether to learn within the trial.
+        planner: Name of the planner.
+        unreachable: What to do about a goal that no known path leads to.
+        settled: Entropy of O below which an object is recognised, nats.
+        n_stations: Objects before the robot, all different.
+        n_remembered: Cubes that the memory is learned from.
+        n_objects: |O|.
+        learning_world: Name of the world in which the memory is learned; the ideal one, since it takes many actions.
+        learning_policy: Policy that explores while the memory is learned.
+        learning_actions: Actions on each cube while the memory is learned; ``COMPLETE`` gives it complete ATGs.
+        n_actions: Actions on each object before the robot, at most.
+    """
+
+    world: str = "ideal"
+    world_options: dict[str, Any] = field(default_factory=dict)
+    engine: str = "gtsam"
+    parameters: ModelParameters = field(default_factory=ModelParameters)
+    planner: str = "attempts"
+    unreachable: str = "declare"
+    settled: float = SETTLED
+    n_stations: int = 3
+    n_remembered: int = 20
+    n_objects: int = 100
+    learning_world: str = "ideal"
+    learning_policy: str = "explore"
+    learning_actions: int = 20
+    n_actions: int = 40
+
+    def __post_init__(self) -> None:
+        for name in ("n_stations", "n_remembered", "n_objects", "n_actions"):
+            if getattr(self, name) < 1:
+                raise InvalidInputError(f"{name}: {getattr(self, name)}; expected a whole number of at least 1")
+        if self.learning_actions < 0:
+            raise InvalidInputError(f"learning_actions: {self.learning_actions}; expected 0 (complete ATGs) or more")
+        for name, larger in (("n_stations", "n_remembered"), ("n_remembered", "n_objects")):
+            if getattr(self, name) > getattr(self, larger):
+                raise InvalidInputError(
+                    f"{name}: {getattr(self, name)}; expected at most {larger} = {getattr(self, larger)}"
+                )
+        check_engine(self.engine, self.parameters)
+        for role, name, known in (
+            ("planner", self.planner, PLANNERS),
+            ("policy", self.learning_policy, POLICIES),
+            ("unreachable", self.unreachable, UNREACHABLE),
+        ):
+            if name not in known:
+                raise unknown_name(role, name, known)
+        check_arcube_world("world", self.world)
+        check_arcube_world("learning_world", self.learning_world)
+
+
+@dataclass(frozen=True, eq=False)
+class GoalRun:
+    """One run: what came of each goal, and the record of the trial at each station."""
+
+    served: tuple[ServedObject, ...]
+    records: tuple[TrialRecord, ...]
+
+    def _repr_html_(self) -> str:
+        return table_of_goals(self.served)._repr_html_()
+
+
+def run_goals(
+    plan: GoalPlan,
+    seed: np.random.SeedSequence,
+    on_look: Callable[[World], None] | None = None,
+) -> GoalRun:
+    """Learn a memory, set up the objects with random goals, and serve one after the other.
+
+    Args:
+        plan: Worlds, engine, planner and sizes.
+        seed: Of the run; all of its generators are spawned from it.
+        on_look: Called with the world after every look, such as to film it.
+    """
+    cubes_seed, learning_seed, setup_seed, *station_seeds = seed.spawn(3 + plan.n_stations)
+    cubes = make_arcubes(plan.n_remembered, int(cubes_seed.generate_state(1)[0]))
+    assumptions = arcube_assumptions(plan.n_objects)
+    if plan.learning_actions == COMPLETE:
+        memory = complete_memory(assumptions, cubes)
+    else:
+        policy = make_policy(plan.learning_policy)
+        rng = np.random.default_rng(learning_seed)
+        memory = learned_memory(
+            assumptions, cubes, policy, plan.learning_actions, rng, plan.learning_world, plan.parameters
+        )
+    setup = np.random.default_rng(setup_seed)
+    objects = setup.permutation(len(cubes))[: plan.n_stations].tolist()
+    served, records = [], []
+    memory_prior = IdentityBelief.uniform(len(memory), memory.n_unseen)
+    beliefs: list[IdentityBelief] = []
+    with closing(make_stations(plan.world, plan.n_stations, cubes=cubes, **plan.world_options)) as world:
+        world.reset(seed=int(setup.integers(2**31)), options={"objects": objects})
+        for station, (number, station_seed) in enumerate(zip(objects, station_seeds, strict=True)):
+            wanted = shown_pattern(cubes[number], int(setup.integers(len(ORIENTATIONS))))
+            goal_policy = GoalPolicy(Goal(assumptions.alphabet, wanted), plan.planner, plan.unreachable, plan.settled)
+            # The objects are different ones: what is known of those served says what this one is not.
+            prior = identity_given_others(memory_prior, beliefs)
+            inference = begin_trial(plan.engine, memory, plan.parameters, prior=prior)
+            record = run_trial(
+                AtStation(world, station),
+                inference,
+                goal_policy,
+                plan.n_actions,
+                np.random.default_rng(station_seed),
+                on_step=None if on_look is None else lambda _: on_look(world),
+            )
+            beliefs.append(record.belief.with_prior(memory_prior, instead_of=prior))
+            reached = record.lost_truth is None and goal_policy.is_reached(inference)
+            learns = plan.parameters.learn_in_trial
+            served.append(score(record, goal_policy.goal, reached, memory, cubes[number], learns))
+            records.append(record)
+    return GoalRun(tuple(served), tuple(records))
+
+
+def run_many(
+    plan: GoalPlan,
+    seed: int,
+    n_runs: int,
+    jobs: int = 1,
+    records: Path | None = None,
+    resume: bool = False,
+    executor: str = "process",
+    on_run: Callable[[], None] | None = None,
+) -> list[tuple[ServedObject, ...]]:
+    """Run the experiment ``n_runs`` times and return what came of each run, in order.
+
+    Each run has a seed of its own, spawned from ``SeedSequence(seed)``; any executor and any number of jobs give the
+    same results.
+
+    Args:
+        plan: What each run is made of.
+        seed: Of all runs.
+        n_runs: How many.
+        jobs: As for ``executors.run_pieces``.
+        records: Folder in which every run is saved as it ends; all workers must have it.
+        resume: Leave out the runs that are already there.
+        executor: As for ``executors.run_pieces``.
+        on_run: Called after each run.
+
+    Raises:
+        InvalidInputError: The records are there already, or of another experiment.
+    """
+    if n_runs < 1:
+        raise InvalidInputError(f"runs: {n_runs}; expected a whole number of at least 1")
+    if records is not None:
+        records = make_folder(records).resolve()
+        for number in range(n_runs) if not resume else ():
+            check_not_begun(_run_path(records, number))
+
+    def tell(_number: int, _served: tuple[ServedObject, ...]) -> None:
+        if on_run is not None:
+            on_run()
+
+    return run_pieces(partial(_run_and_save, plan, seed, records), range(n_runs), executor, jobs, tell)
+
+
+def run_seed(seed: int, number: int) -> np.random.SeedSequence:
+    """Return the seed of the run with this number."""
+    return np.random.SeedSequence(seed, spawn_key=(number,))
+
+
+def _run_path(records: Path, number: int) -> Path:
+    return records / f"run-{number:04}.json.gz"
+
+
+def _run_and_save(plan: GoalPlan, seed: int, records: Path | None, number: int) -> tuple[ServedObject, ...]:
+    """Run once; a run that is saved already, perhaps by a worker that died right after, is only read."""
+    if records is None:
+        return run_goals(plan, run_seed(seed, number)).served
+    # What is as usual is left out, so that a plan may get more to say and old records still be gone on with.
+    usual = asdict(GoalPlan())
+    unusual = {name: value for name, value in asdict(plan).items() if value != usual[name]}
+    file = GoalRunFile(_run_path(records, number), {"seed": seed, "run": number, **unusual})
+    if file.path.exists():
+        return file.read()
+    run = run_goals(plan, run_seed(seed, number))
+    file.write(run.served, run.records)
+    return run.served
+
+
+_FORMAT: Final = {"format": "atg-fg/goal-run", "version": 1}
+
+
+class GoalRunFile:
+    """The file of one run.
+
+    Args:
+        path: ``….json.gz``.
+        header: What run this is; a file of another one is refused.
+    """
+
+    def __init__(self, path: Path, header: Mapping[str, Any]) -> None:
+        self.path = path
+        self._header = json.loads(json.dumps({**_FORMAT, **header}, default=plain_json))
+
+    def write(self, served: Sequence[ServedObject], records: Sequence[TrialRecord]) -> None:
+        """Save what came of each goal, with what was seen and done."""
+        entries = [{**asdict(each), "trial": summary_of(record)} for each, record in zip(served, records, strict=True)]
+        document = {**self._header, "served": entries}
+        text = json.dumps(document, default=plain_json, allow_nan=False, separators=(",", ":"))
+        write_bytes_atomically(self.path, gzip.compress(text.encode(), mtime=0))
+
+    def read(self) -> tuple[ServedObject, ...]:
+        """Return what came of each goal.
+
+        Raises:
+            InvalidInputError: The file cannot be read, or it is of another run.
+        """
+        try:
+            document = json.loads(gzip.decompress(self.path.read_bytes()))
+            served = tuple(_served(each) for each in document.pop("served"))
+        except (OSError, EOFError, zlib.error, ValueError, KeyError, TypeError, AttributeError) as error:
+            raise InvalidInputError(
+                f"{self.path}: cannot be read: {error!r}; expected a run that --records wrote"
+            ) from error
+        if document != self._header:
+            raise InvalidInputError(
+                f"{self.path}: holds {json.dumps(document)}; expected the run of {json.dumps(self._header)}"
+            )
+        return served
+
+
+def _served(entry: dict[str, Any]) -> ServedObject:
+    del entry["trial"]
+    for name in ("goal", "nearest"):
+        entry[name] = None if entry[name] is None else tuple(entry[name])
+    return ServedObject(**entry)

@@ -1,0 +1,206 @@
+"""What is right over the trials of a test, and tables of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, Final
+
+from atg_fg.core.records import TrialOutcome
+from atg_fg.core.statistics import mean, mean_interval, standard_error, wilson_interval
+from atg_fg.core.table import _ROWS, Bar, Cell, HtmlTable, shortened
+from atg_fg.learning.duplicates import Duplicate
+
+
+@dataclass(frozen=True)
+class TestResult:
+    """Scores of one test, in the paper's terms.
+
+    Attributes:
+        seed: Seed of the test.
+        identification: (trials judged novel if and only if the object was, trials).
+        recognition: (of these matched to an ATG made from the object, trials in which an object met before was
+            judged known).
+        success: (trials right in both, trials).
+        lost: Trials that ended because the world lost the object.
+        undecided: Trials in which nothing at all was seen.
+        actions: Number of actions of each trial.
+        merges: (false merges, merges), if duplicates were merged; false are those of ATGs made from two objects.
+    """
+
+    __test__ = False
+
+    seed: int
+    identification: tuple[int, int]
+    recognition: tuple[int, int]
+    success: tuple[int, int]
+    lost: int = 0
+    undecided: int = 0
+    actions: tuple[int, ...] = ()
+    merges: tuple[int, int] | None = None
+
+    def _repr_html_(self) -> str:
+        return table_of_tests([self])._repr_html_()
+
+
+class Score:
+    """Counts what is right over the trials of one test, by the truth rather than by the memory.
+
+    Args:
+        made_from: The object that each ATG was made from, by its name, if the memory is not empty at first.
+    """
+
+    def __init__(self, made_from: Mapping[str, object] | None = None) -> None:
+        self.n_trials = self.identified = self.recognised = self.judged_known = self.successes = 0
+        self.lost = self.undecided = 0
+        self._actions: list[int] = []
+        self.merges = self.false_merges = 0
+        self._made_from: dict[str, object] = dict(made_from or {})
+        self._presented: set[object] = set(self._made_from.values())
+
+    def add(self, outcome: TrialOutcome, learned: str | None) -> None:
+        """Score a trial whose record went to the ATG named ``learned``.
+
+        A trial without a verdict is no success, but its object was met.
+        """
+        self.n_trials += 1
+        self.lost += outcome.verdict == "lost"
+        self.undecided += outcome.verdict == "undecided"
+        self._actions.append(len(outcome.actions))
+        seen_before = outcome.object in self._presented
+        identified = outcome.verdict == ("known" if seen_before else "novel")
+        right_match = outcome.matched is not None and self._made_from.get(outcome.matched) == outcome.object
+        self.identified += identified
+        self.judged_known += seen_before and identified
+        self.recognised += seen_before and identified and right_match
+        self.successes += identified and (right_match or not seen_before)
+        self._presented.add(outcome.object)
+        if learned is not None and outcome.verdict == "novel":
+            self._made_from[learned] = outcome.object
+
+    def has_met(self, presented: object) -> bool:
+        """Whether an object was presented in a trial before."""
+        return presented in self._presented
+
+    def add_merges(self, merged: Sequence[Duplicate]) -> None:
+        """Count merges; the merged ATG counts as made from the object of the one that was kept."""
+        for each in merged:
+            self.merges += 1
+            self.false_merges += self._made_from[each.keep] != self._made_from[each.drop]
+
+    def result(self, seed: int, *, merging: bool = False) -> TestResult:
+        """Return the scores of the test with this seed, and of its merges if there was merging."""
+        return TestResult(
+            seed,
+            (self.identified, self.n_trials),
+            (self.recognised, self.judged_known),
+            (self.successes, self.n_trials),
+            self.lost,
+            self.undecided,
+            tuple(self._actions),
+            (self.false_merges, self.merges) if merging else None,
+        )
+
+
+def summarise(results: Iterable[TestResult]) -> dict[str, Any]:
+    """Return the tests, their average as the paper takes it (a mean over tests), and intervals.
+
+    Wilson intervals count all trials of all tests as one sample; the standard error is over tests.
+    """
+    tests = list(results)
+    rates = {
+        name: [score[0] / score[1] for score in (getattr(test, name) for test in tests) if score[1] > 0]
+        for name in ("identification", "recognition", "success")
+    }
+    return {
+        "tests": [
+            {
+                "seed": test.seed,
+                "identification": list(test.identification),
+                "recognition": list(test.recognition),
+                "success": test.success[0] / test.success[1],
+                "lost": test.lost,
+                "undecided": test.undecided,
+                **_merges_of([test]),
+            }
+            for test in tests
+        ],
+        "average": {name: mean(values) for name, values in rates.items()},
+        "standard_error": {name: standard_error(values) for name, values in rates.items()},
+        "interval95": {name: list(pooled_interval(tests, name)) for name in rates},
+        "lost": sum(test.lost for test in tests),
+        "undecided": sum(test.undecided for test in tests),
+        **_merges_of(tests),
+    }
+
+
+def actions_a_trial(results: Iterable[TestResult]) -> dict[str, Any]:
+    """Return the mean number of actions of a trial, and its interval: all trials of all tests count as one sample."""
+    numbers = [number for test in results for number in test.actions]
+    interval = mean_interval(numbers)
+    return {"mean": mean(numbers), "interval95": None if interval is None else list(interval)}
+
+
+def _merges_of(tests: Sequence[TestResult]) -> dict[str, int]:
+    """Return the merges of tests, and how many of them were false; nothing if duplicates were not merged."""
+    counts = [test.merges for test in tests if test.merges is not None]
+    if not counts:
+        return {}
+    return {"merges": sum(number for _, number in counts), "false_merges": sum(false for false, _ in counts)}
+
+
+def pooled_interval(tests: Sequence[TestResult], score: str) -> tuple[float, float]:
+    """Return the Wilson interval of a score over all trials of all tests."""
+    counts = [getattr(test, score) for test in tests]
+    return wilson_interval(sum(right for right, _ in counts), sum(number for _, number in counts))
+
+
+_SCORES: Final = ("identification", "recognition", "success")
+
+
+def table_of_tests(tests: Sequence[TestResult], title: str = "") -> HtmlTable:
+    """Return tests as the paper's Table 1 has them, with the average over tests and intervals over all trials."""
+    rows: list[tuple[Cell, ...]] = [
+        (str(test.seed), *(_count(getattr(test, score)) for score in _SCORES)) for test in tests
+    ]
+    rows = list(shortened(rows, _ROWS, "tests"))
+    if len(tests) > 1:
+        rows.append(("average", *(_average(tests, score) for score in _SCORES)))
+    rows.append(("95 % interval", *(_interval(tests, score) for score in _SCORES)))
+    endings = [f"{number} {name}" for name in ("lost", "undecided") if (number := sum(getattr(t, name) for t in tests))]
+    noun = "test" if len(tests) == 1 else "tests"
+    return HtmlTable(title or f"{len(tests)} {noun}", ("seed", *_SCORES), tuple(rows), ", ".join(endings))
+
+
+def _comparison(compared: Mapping[str, Sequence[TestResult]], title: str) -> HtmlTable:
+    rows: list[tuple[Cell, ...]] = []
+    for name, tests in compared.items():
+        cells = [Bar(_average(tests, score).share, _with_interval(tests, score)) for score in _SCORES]
+        rows.append((name, str(len(tests)), *cells))
+    note = "averages over tests; 95 % Wilson intervals over all trials"
+    return HtmlTable(title or "Tests compared", ("", "tests", *_SCORES), tuple(rows), note)
+
+
+def _count(count: tuple[int, int]) -> Bar:
+    right, total = count
+    return Bar(right / total if total else 0.0, f"{right}/{total}")
+
+
+def _average(tests: Sequence[TestResult], score: str) -> Bar:
+    counts = [getattr(test, score) for test in tests]
+    average = mean([right / total for right, total in counts if total])
+    return Bar(average or 0.0, "–" if average is None else f"{100 * average:.1f} %")
+
+
+def _interval(tests: Sequence[TestResult], score: str) -> str:
+    counts = [getattr(test, score) for test in tests]
+    total = sum(total for _, total in counts)
+    if not total:
+        return "–"
+    low, high = wilson_interval(sum(right for right, _ in counts), total)
+    return f"{100 * low:.1f}–{100 * high:.1f}"
+
+
+def _with_interval(tests: Sequence[TestResult], score: str) -> str:
+    average, interval = _average(tests, score).text, _interval(tests, score)
+    return average if interval == "–" else f"{average} ({interval})"

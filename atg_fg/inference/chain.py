@@ -1,0 +1,177 @@
+"""One trial as a chain of plain arrays: what every exact engine and the factor graph are made from.
+
+Learning within the trial changes the tables from step to step. It depends on the evidence alone, not on the
+belief, so the chain of a trial can be made again at any time from what was done and seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from atg_fg.core.belief import IdentityBelief
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.log_math import log_of
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.patterns import Evidence, FloatArray
+from atg_fg.inference.recognition_model import COLLECTION, RecognitionModel, Revelation
+
+
+@dataclass
+class History:
+    """What was seen and done in a trial: z_0, a_1, z_1, …; it may end with an action.
+
+    Attributes:
+        evidence: The evidence of each look.
+        actions: Index of each action; as many as looks, or one less.
+    """
+
+    evidence: list[Evidence] = field(default_factory=list)
+    actions: list[int] = field(default_factory=list)
+
+    @property
+    def awaits_evidence(self) -> bool:
+        """Whether the next entry is a look rather than an action."""
+        return len(self.evidence) == len(self.actions)
+
+    def up_to(self, step: int) -> History:
+        """Return the last two looks up to time ``step``, with the action between them."""
+        first = max(step - 1, 0)
+        return History(self.evidence[first : step + 1], self.actions[first:step])
+
+    def learn(self, model: RecognitionModel) -> Revelation | None:
+        """Let ``model`` learn from the last look of this history."""
+        if len(self.evidence) == 1:
+            return model.learn(None, None, self.evidence[0].pattern)
+        return model.learn(self.evidence[-2].pattern, self.actions[-1], self.evidence[-1].pattern)
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """Factors of p(O, X_0:t, z_0:t | a_1:t), with H hypotheses and W_s (padded) states at time s.
+
+    Attributes:
+        prior: p(O), shape [H].
+        initial: p(X_0 | O), shape [H, W_0].
+        transitions: p(X_s | X_{s-1}, a_s, O) for s = 1 … t, each of shape [H, W_{s-1}, W_s].
+        likelihoods: p(z_s | X_s, O) for each look, each of shape [H, W_s]; one less than there are
+            variables X if the trial ended with an action.
+    """
+
+    prior: FloatArray
+    initial: FloatArray
+    transitions: tuple[FloatArray, ...]
+    likelihoods: tuple[FloatArray, ...]
+
+    @property
+    def widths(self) -> tuple[int, ...]:
+        """W_s for every time s."""
+        return (self.initial.shape[1], *(transition.shape[2] for transition in self.transitions))
+
+    def given(self, hypothesis: int) -> Chain:
+        """Return the chain under one hypothesis alone (H = 1)."""
+        return Chain(
+            self.prior[[hypothesis]],
+            self.initial[[hypothesis]],
+            tuple(table[[hypothesis]] for table in self.transitions),
+            tuple(table[[hypothesis]] for table in self.likelihoods),
+        )
+
+    def scaled(self) -> tuple[Chain, float]:
+        """Return the chain with every likelihood divided by its greatest value, and the sum of their logarithms.
+
+        So evidence on any scale stays within the range of floats. A likelihood that is zero throughout is kept.
+        """
+        greatest = [float(table.max()) or 1.0 for table in self.likelihoods]
+        likelihoods = tuple(table / scale for table, scale in zip(self.likelihoods, greatest, strict=True))
+        return replace(self, likelihoods=likelihoods), float(np.log(greatest).sum())
+
+
+def build_chain(
+    memory: RobotMemory,
+    parameters: ModelParameters,
+    history: History,
+    hypotheses: Sequence[int] | None = None,
+    prior: IdentityBelief | None = None,
+) -> Chain:
+    """Return the chain of a trial, for all hypotheses or for some of them, from the memory's p(O) or from ``prior``.
+
+    With learning within the trial the state space of X_s is the one *after* z_s was learned from: a new aspect is
+    reached as its collection node was, and the two share that node's likelihood as ``docs/model.md`` says.
+    """
+    if not history.evidence:
+        raise InvalidInputError("trial: nothing observed yet; expected a first observation")
+    model = RecognitionModel(memory, parameters, prior)
+    chosen = list(range(model.n_hypotheses)) if hypotheses is None else list(hypotheses)
+    incoming: list[FloatArray] = []
+    likelihoods: list[FloatArray] = []
+    for step, evidence in enumerate(history.evidence):
+        table = model.transition(history.actions[step - 1]) if step else model.base
+        likelihood = model.likelihood(evidence)
+        revelation = history.up_to(step).learn(model)
+        if revelation is not None:
+            padding = [(0, 0)] * (table.ndim - 1) + [(0, model.n_states - table.shape[-1])]
+            table, likelihood = np.pad(table, padding), np.pad(likelihood, padding[-2:])
+            table[revelation.hypotheses, ..., revelation.states] = table[revelation.hypotheses, ..., COLLECTION]
+            revelation.move(likelihood)
+        incoming.append(table[chosen])
+        likelihoods.append(likelihood[chosen])
+    if history.awaits_evidence:
+        incoming.append(model.transition(history.actions[-1])[chosen])
+    return Chain(model.prior[chosen], incoming[0], tuple(incoming[1:]), tuple(likelihoods))
+
+
+class ForwardPass(NamedTuple):
+    """The Bayes filter of a whole chain, one object at a time, as logarithms where numbers may be small.
+
+    Attributes:
+        log_joints: ln p(O, z_0:s | a_1:s) for every time s, −∞ where an object is ruled out, each of shape [H].
+        filtered: p(X_s | O, z_0:s, a_1:s) for every time s, each of shape [H, W_s]; zero where an object is ruled out.
+    """
+
+    log_joints: tuple[FloatArray, ...]
+    filtered: tuple[FloatArray, ...]
+
+    @property
+    def log_joint(self) -> FloatArray:
+        """Return ln p(O, z_0:t | a_1:t) at the end of the trial, shape [H]."""
+        return self.log_joints[-1]
+
+
+def forward_pass(chain: Chain) -> ForwardPass:
+    """Return the forward pass of a chain."""
+    log_joint = log_of(chain.prior)
+    log_joints: list[FloatArray] = []
+    filtered: list[FloatArray] = []
+    predicted = chain.initial
+    for time in range(len(chain.widths)):
+        if time:
+            predicted = np.matmul(filtered[-1][:, None, :], chain.transitions[time - 1])[:, 0, :]
+        joint = predicted * chain.likelihoods[time] if time < len(chain.likelihoods) else predicted
+        total = joint.sum(axis=1)
+        log_joint = log_joint + log_of(total)
+        log_joints.append(log_joint)
+        filtered.append(joint / np.where(total > 0, total, 1.0)[:, None])
+    return ForwardPass(tuple(log_joints), tuple(filtered))
+
+
+def forward_backward(chain: Chain) -> list[FloatArray]:
+    """Return p(X_s | O, z_0:t, a_1:t) of a chain with one hypothesis, each of shape [W_s]."""
+    likelihoods = [table[0] for table in chain.likelihoods]
+    likelihoods += [np.ones(width) for width in chain.widths[len(likelihoods) :]]
+    forward = [_normalised(chain.initial[0] * likelihoods[0])]
+    for transition, likelihood in zip(chain.transitions, likelihoods[1:], strict=True):
+        forward.append(_normalised(forward[-1] @ transition[0] * likelihood))
+    backward = [np.ones(chain.widths[-1])]
+    for transition, likelihood in zip(reversed(chain.transitions), reversed(likelihoods[1:]), strict=True):
+        backward.append(_normalised(transition[0] @ (likelihood * backward[-1])))
+    return [_normalised(past * future) for past, future in zip(forward, reversed(backward), strict=True)]
+
+
+def _normalised(mass: FloatArray) -> FloatArray:
+    total = mass.sum()
+    return mass / total if total > 0 else mass

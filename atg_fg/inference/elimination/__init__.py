@@ -1,0 +1,1 @@
+"""Exact answers about any discrete factor graph, by bucket elimination."""

@@ -1,0 +1,212 @@
+"""What every inference engine answers."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from types import MappingProxyType
+from typing import Any, ClassVar
+
+import numpy as np
+
+from atg_fg.core.belief import SHOWN, BeliefTable, IdentityBelief
+from atg_fg.core.errors import ImpossibleEvidenceError, InvalidInputError
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.patterns import Evidence, FloatArray
+from atg_fg.inference.belief_components import Situation, shown_patterns_of, situations_of
+from atg_fg.inference.belief_tree import ImaginedBelief, TableBelief
+from atg_fg.inference.chain import Chain, History, build_chain
+from atg_fg.inference.recognition_model import RecognitionModel, Revelation
+
+
+class Inference(ABC):
+    """Inference in one trial: look, act, look, act …, and ask for the posterior at any time.
+
+    A subclass is an engine. It says by ``exact`` whether its posteriors are those of the model, and by
+    ``knows_structure`` whether it can let objects follow a structure that all share.
+
+    Args:
+        memory: The robot memory when the trial begins; it is not changed.
+        parameters: α, δ and whether to learn within the trial.
+        prior: p(O) when the trial begins; the memory's if not given.
+    """
+
+    name: ClassVar[str]
+    exact: ClassVar[bool]
+    knows_structure: ClassVar[bool] = False
+    #: The engine's own options that ``begin_trial`` was given.
+    options: Mapping[str, Any] = MappingProxyType({})
+
+    def __init__(self, memory: RobotMemory, parameters: ModelParameters, prior: IdentityBelief | None = None) -> None:
+        self.memory = memory
+        self.parameters = parameters
+        self.prior = prior
+        self.model = self._tables()
+        self.history = History()
+
+    def _tables(self) -> RecognitionModel:
+        """Return the tables in force when the trial begins; an engine that does without some of them overrides this."""
+        return RecognitionModel(self.memory, self.parameters, self.prior)
+
+    def observe(self, evidence: Evidence) -> None:
+        """Take in the evidence z_t of a look, then learn from it if the parameters say so.
+
+        Raises:
+            InvalidInputError: It is an action's turn, or the evidence is not over this alphabet.
+            ImpossibleEvidenceError: The evidence has probability zero under the model; nothing has changed.
+        """
+        if not self.history.awaits_evidence:
+            raise InvalidInputError("trial: two observations in a row; expected an action between them")
+        evidence.check(self.model.n_patterns)
+        self._look(evidence)
+        self.history.evidence.append(evidence)
+        revelation = self.history.learn(self.model)
+        if revelation is not None:
+            self._divide(revelation)
+
+    def act(self, action: int) -> None:
+        """Predict the effect of an action a_{t+1}.
+
+        Raises:
+            InvalidInputError: It is an observation's turn, or there is no such action.
+        """
+        if self.history.awaits_evidence:
+            raise InvalidInputError("trial: an action without an observation before it; expected an observation")
+        whole = isinstance(action, (int, np.integer)) and not isinstance(action, bool)
+        if not whole or not 0 <= action < self.model.n_actions:
+            raise InvalidInputError(f"action: {action!r}; expected 0 to {self.model.n_actions - 1}")
+        self._predict(int(action))
+        self.history.actions.append(int(action))
+
+    def expected_entropies(self) -> FloatArray:
+        """E[H(O | z_{t+1}, a, …)] of each action (eq. 3) in nats, shape [A].
+
+        Raises:
+            InvalidInputError: Asked before a look or between an action and its look.
+        """
+        self._check_looked("expected entropy")
+        return self._expected_entropies()
+
+    def belief_table(self, shown: int = SHOWN) -> BeliefTable:
+        """Return p(O | z_0:t, a_1:t) with the names of the objects, as a table that a notebook shows.
+
+        Args:
+            shown: How many objects are shown one by one, the most probable first.
+        """
+        return self.identity().named(self.memory.names, shown)
+
+    def situations(self) -> list[Situation]:
+        """Return what the object may be, and where in it the robot may be; improbable ones are left out."""
+        return situations_of(self.model, self.aspect_belief)
+
+    def shown_patterns(self) -> FloatArray:
+        """Return the probability of each pattern to be the one shown now, given all evidence, shape [|𝒵|].
+
+        Raises:
+            InvalidInputError: Asked before a look or between an action and its look.
+        """
+        self._check_looked("shown patterns")
+        return shown_patterns_of(self.model, self.aspect_belief, self.history.evidence[-1])
+
+    def imagined(self) -> ImaginedBelief:
+        """Return the present belief as one to imagine actions and looks from; the trial is not changed by them.
+
+        An engine that does not predict by the model's tables overrides this.
+
+        Raises:
+            InvalidInputError: Asked before a look or between an action and its look.
+        """
+        self._check_looked("imagined")
+        return TableBelief(self.model, self.aspect_belief)
+
+    def chain(self, hypothesis: int | None = None) -> Chain:
+        """Return the trial so far as plain arrays, for all hypotheses or under one of them."""
+        hypotheses = None if hypothesis is None else [hypothesis]
+        return build_chain(self.memory, self.parameters, self.history, hypotheses, self.prior)
+
+    def _check_looked(self, asked: str) -> None:
+        """Raise ``InvalidInputError`` if what is asked for makes no sense before the next look."""
+        if self.history.awaits_evidence:
+            raise InvalidInputError(f"{asked}: asked before the look; expected an observation first")
+
+    def _impossible(self) -> ImpossibleEvidenceError:
+        """Return the error for a look, the one about to be taken in, that no hypothesis allows."""
+        return ImpossibleEvidenceError(
+            f"observation {len(self.history.evidence)}: the evidence has probability zero under the model; "
+            "expected evidence that some object could give, or noise above 0"
+        )
+
+    @abstractmethod
+    def identity(self) -> IdentityBelief:
+        """Return p(O | z_0:t, a_1:t) (eq. 1 and 2)."""
+
+    @property
+    @abstractmethod
+    def log_evidence(self) -> float:
+        """Return ln p(z_0:t | a_1:t)."""
+
+    @property
+    def total_variation_bound(self) -> float | None:
+        """A bound of ½ Σ |p(O) − q(O)| to the exact posterior, 0 of exact engines; ``None`` if the engine has none."""
+        return 0.0 if self.exact else None
+
+    @property
+    def aspect_belief(self) -> FloatArray:
+        """p(O, X_t | z_0:t, a_1:t), shape [H, W]; after an action X_t is the aspect that it leads to."""
+        if not self.history.evidence:
+            return self.model.prior[:, None] * self.model.base
+        joint = np.zeros((self.model.n_hypotheses, self.model.n_states))
+        identity = self.identity().probabilities
+        for hypothesis in np.flatnonzero(identity):
+            joint[hypothesis] = identity[hypothesis] * self.smoothed_aspects(int(hypothesis))[-1]
+        return joint
+
+    def smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
+        """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s, each of shape [W_s].
+
+        State 0 is the collection node, state 1 + k the k-th known aspect.
+
+        Raises:
+            InvalidInputError: There is no such hypothesis, or nothing was observed yet.
+            ImpossibleEvidenceError: The hypothesis or the evidence under it has probability zero.
+        """
+        if not 0 <= hypothesis < self.model.n_hypotheses:
+            raise InvalidInputError(f"hypothesis: {hypothesis}; expected 0 to {self.model.n_hypotheses - 1}")
+        if not self.history.evidence:
+            raise InvalidInputError("smoothed aspects: nothing observed yet; expected a first observation")
+        if not self.model.prior[hypothesis] > 0:
+            raise ImpossibleEvidenceError(
+                f"smoothed aspects: hypothesis {hypothesis} has prior probability zero; expected one that is possible"
+            )
+        marginals = self._smoothed_aspects(hypothesis)
+        if not all(marginal.sum() > 0 for marginal in marginals):
+            raise ImpossibleEvidenceError(
+                f"smoothed aspects: the evidence has probability zero under hypothesis {hypothesis}; "
+                "expected one that is possible"
+            )
+        return marginals
+
+    @abstractmethod
+    def _smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
+        """Return ``smoothed_aspects``, or zeros, of a hypothesis that there is."""
+
+    def _look(self, evidence: Evidence) -> None:
+        """Condition on a look; raise before any change if it is impossible."""
+        self._update(self.model.likelihood(evidence))
+
+    @abstractmethod
+    def _update(self, likelihood: FloatArray) -> None:
+        """Condition on a look with p(z | x, i), shape [H, W]; raise before any change if impossible."""
+
+    @abstractmethod
+    def _divide(self, revelation: Revelation) -> None:
+        """Move belief from collection nodes to the aspects just found; the model has them already."""
+
+    @abstractmethod
+    def _predict(self, action: int) -> None:
+        """Add the action's transition."""
+
+    @abstractmethod
+    def _expected_entropies(self) -> FloatArray:
+        """Return eq. 3 for each action, shape [A]."""

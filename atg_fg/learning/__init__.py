@@ -1,0 +1,1 @@
+"""What is learned across trials: the structure that objects share, duplicates, memories united."""

@@ -1,0 +1,272 @@
+"""Learning of the shared structure, trial by trial.
+
+Structures that explained the trials so far are kept, and each new trial is scored under them. At milestones, which
+come ever more rarely, the rates are estimated again, and as long as no structure is settled others are searched for.
+So the whole of what is learned depends on the trials and the seed alone, and the work is bounded where there is
+nothing to be found.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from atg_fg.core.assumptions import Assumptions
+from atg_fg.core.errors import TooLargeError
+from atg_fg.core.patterns import FloatArray
+from atg_fg.learning.candidate import Candidate
+from atg_fg.learning.likelihood import plain_log_evidence
+from atg_fg.learning.rates import Rates, estimate_rates
+from atg_fg.learning.raw_trials import RawTrial
+from atg_fg.learning.search import SearchPlan, propose_structures
+from atg_fg.learning.shared_structure import SharedStructure
+
+#: Up to so many trials each is a milestone; from there on the number grows by a quarter from one to the next.
+DENSE_MILESTONES: Final = 8
+
+
+#: A structure is settled if it is this many nats better than none.
+SETTLED_GAIN: Final = 50.0
+
+
+#: A structure that takes this share of looks and symbols for errors is in doubt, however much it explains.
+DOUBTFUL_ERRORS: Final = 0.02
+
+
+#: A structure that takes a greater share of its followers' looks for errors is nearly right at best. It is not kept,
+#: however much it explains: the same mistakes come again with the same object, and a new object, whose mistakes are
+#: accidents as well, explains them as well as the right one. So many errors more are forgiven, for the first trials.
+MAX_WRONG: Final = 0.02
+
+
+FORGIVEN: Final = 2.0
+
+
+#: Structures that are believed in at once, and how many nats the others may be behind the best.
+MAX_BELIEVED: Final = 3
+
+
+BELIEVED_WITHIN: Final = 7.0
+
+
+#: Structures that are kept up, and how many nats they may be behind the best.
+MAX_CANDIDATES: Final = 5
+
+
+KEPT_WITHIN: Final = 10.0
+
+
+#: Proposals of a search that are scored on all trials.
+MAX_PROPOSALS: Final = 4
+
+
+#: Rates that differ by less than this factor are as good as the same.
+RATE_FACTOR: Final = 1.25
+
+
+class BelievedStructure(NamedTuple):
+    """A structure with the weight it has, and what it says of the K remembered objects.
+
+    Attributes:
+        structure: The structure.
+        weight: p(structure | all trials); with those of the others and of *no structure* it sums to one.
+        followers: Probability of each object to follow it, shape [K].
+        contents: What each object has in its registers, shape [K, P, S].
+    """
+
+    structure: SharedStructure
+    weight: float
+    followers: FloatArray
+    contents: FloatArray
+
+
+def is_milestone(n_trials: int) -> bool:
+    """Return whether rates are estimated, and structures searched for, after this many trials."""
+    milestone = DENSE_MILESTONES
+    while milestone < n_trials:
+        milestone = -(-milestone * 5 // 4)
+    return n_trials <= DENSE_MILESTONES or milestone == n_trials
+
+
+class StructureLearner:
+    """Learns what all objects share from raw trials.
+
+    Args:
+        assumptions: Actions and alphabet.
+        seed: Of the searches.
+        plan: How much is searched at a milestone.
+
+    Attributes:
+        trials: All raw trials, in their order.
+        owners: Name of the object of each.
+        rates: Those in force.
+        n_evaluations: Structures scored in all searches so far.
+    """
+
+    def __init__(self, assumptions: Assumptions, seed: int = 0, plan: SearchPlan | None = None) -> None:
+        self.assumptions, self.seed, self.plan = assumptions, seed, plan or SearchPlan()
+        self.trials: list[RawTrial] = []
+        self.owners: list[str] = []
+        self.rates = Rates()
+        self.n_evaluations = 0
+        self._objects: dict[str, int] = {}
+        self._owner_indices: list[int] = []
+        self._plain: list[float] = []
+        self._candidates: list[Candidate] = []
+
+    def learn(self, owner: str, trial: RawTrial) -> None:
+        """Learn from one more trial.
+
+        Args:
+            owner: Name of its object.
+            trial: What was seen and done.
+        """
+        self._append(owner, trial)
+        for candidate in self._candidates:
+            candidate.extend(trial, self._owner_indices[-1], self.rates)
+        self._candidates = self._worth_keeping()
+        if is_milestone(len(self.trials)):
+            if self._is_worth_a_search():
+                self._search()
+            self._estimate_rates()
+            self._candidates = self._worth_keeping()
+
+    def restore(
+        self, owners: Sequence[str], trials: Sequence[RawTrial], structures: Sequence[SharedStructure], rates: Rates
+    ) -> None:
+        """Become the learner that had these trials, candidates and rates, without searching again."""
+        for owner, trial in zip(owners, trials, strict=True):
+            self._append(owner, trial)
+        self.rates = rates
+        if self.trials:
+            self._candidates = [self._scored(structure) for structure in structures]
+
+    def settle(self) -> None:
+        """Keep the best of the structures at hand, best first, and estimate the rates: trials were put together."""
+        self._candidates = self._worth_keeping()
+        self._estimate_rates()
+        self._candidates = self._worth_keeping()
+
+    def hand_over(self, numbers: Sequence[int], owner: str) -> None:
+        """Take raw trials for those of another object, and learn the contents of all objects anew.
+
+        Args:
+            numbers: Of the trials, in their order.
+            owner: Name of the object that they are of.
+        """
+        if not numbers:
+            return
+        for number in numbers:
+            self.owners[number] = owner
+        self._objects = {}
+        self._owner_indices = [self._objects.setdefault(each, len(self._objects)) for each in self.owners]
+        for candidate in self._candidates:
+            candidate.rescore(self.trials, self._owner_indices, self.rates)
+
+    def same_as(self, other: StructureLearner) -> bool:
+        """Return whether both learned the same from the same trials."""
+        known, others = ((each.trials, each.owners, each.candidates, each.rates, each.seed) for each in (self, other))
+        return known == others
+
+    @property
+    def candidates(self) -> tuple[SharedStructure, ...]:
+        """Structures that are kept up, best first."""
+        return tuple(candidate.structure for candidate in self._candidates)
+
+    @property
+    def gain(self) -> float:
+        """How many nats the best structure is better than none, its prior included; −∞ if there is none."""
+        plain = np.array(self._plain)
+        return max((each.score(plain) - float(plain.sum()) for each in self._candidates), default=-np.inf)
+
+    def believed(self, names: Sequence[str]) -> list[BelievedStructure]:
+        """Return the structures that are believed in, best first, for objects with these names.
+
+        An object of which no trial is there follows none of them.
+        """
+        plain = np.array(self._plain)
+        scores = np.array([candidate.score(plain) for candidate in self._candidates])[:MAX_BELIEVED]
+        scores = scores[scores >= scores.max(initial=-np.inf) - BELIEVED_WITHIN]
+        if not len(scores):
+            return []
+        logarithms = np.append(scores, plain.sum())
+        weights = np.exp(logarithms - logarithms.max())
+        weights /= weights.sum()
+        there = [(position, self._objects[name]) for position, name in enumerate(names) if name in self._objects]
+        believed = []
+        for candidate, weight in zip(self._candidates, weights[:-1].tolist(), strict=False):
+            followers = candidate.followers(plain, self._owner_indices, self.rates.share)
+            own_followers = np.zeros(len(names))
+            own_contents = np.zeros((len(names), candidate.structure.n_registers, self.assumptions.alphabet.n_symbols))
+            for position, index in there:
+                own_followers[position], own_contents[position] = followers[index], candidate.contents[index]
+            believed.append(BelievedStructure(candidate.structure, weight, own_followers, own_contents))
+        return believed
+
+    def _append(self, owner: str, trial: RawTrial) -> None:
+        self.trials.append(trial)
+        self.owners.append(owner)
+        self._owner_indices.append(self._objects.setdefault(owner, len(self._objects)))
+        self._plain.append(plain_log_evidence(trial, self.assumptions))
+
+    def _is_worth_a_search(self) -> bool:
+        """Return whether there may be a structure that explains more than those at hand.
+
+        While none is settled this is so at each milestone, then whenever the trials have doubled: another structure may
+        explain as much at first, or the rest of the trials.
+        """
+        n_trials = len(self.trials)
+        has_doubled = n_trials.bit_length() > (n_trials * 4 // 5).bit_length()  # at every third milestone or so
+        in_doubt = self.rates.wrong + self.rates.repeat > DOUBTFUL_ERRORS
+        return self.gain < SETTLED_GAIN or in_doubt or has_doubled
+
+    def _search(self) -> None:
+        """Add what a search proposes to the candidates."""
+        rng = np.random.default_rng((self.seed, len(self.trials)))
+        found = propose_structures(self.trials, self.assumptions, rng, plan=self.plan, incumbents=self.candidates)
+        self.n_evaluations += found.n_evaluations
+        new = [structure for structure in found.structures[:MAX_PROPOSALS] if structure not in self.candidates]
+        for structure in new:
+            try:
+                self._candidates.append(self._scored(structure))
+            except TooLargeError:
+                continue  # more poses than a structure may have
+        self._candidates = self._worth_keeping()
+
+    def _scored(self, structure: SharedStructure) -> Candidate:
+        candidate = Candidate(structure, self.assumptions.alphabet)
+        candidate.rescore(self.trials, self._owner_indices, self.rates)
+        return candidate
+
+    def _worth_keeping(self) -> list[Candidate]:
+        """Return the best candidates, best first, without those that are far behind, explain nothing or err much."""
+        plain = np.array(self._plain)
+        useful = [
+            each
+            for each in self._candidates
+            if each.responsibilities(plain).max() > 0.5 and self._is_reliable(each, plain)
+        ]
+        scored = sorted(((each.score(plain), each) for each in useful), key=lambda pair: -pair[0])
+        best = max(float(plain.sum()), scored[0][0]) if scored else 0.0
+        return [each for score, each in scored[:MAX_CANDIDATES] if score >= best - KEPT_WITHIN]
+
+    def _is_reliable(self, candidate: Candidate, plain: FloatArray) -> bool:
+        tally = candidate.tally(self.trials, plain)
+        return tally.wrong <= FORGIVEN + MAX_WRONG * tally.n_looks
+
+    def _estimate_rates(self) -> None:
+        """Estimate the rates under the best structure, if it is better than none, and score anew if they changed."""
+        if self.gain <= 0:
+            return
+        plain, best = np.array(self._plain), self._candidates[0]
+        followers = best.followers(plain, self._owner_indices, self.rates.share)
+        estimated = estimate_rates(best.tally(self.trials, plain), followers)
+        old, new = (np.array([each.slip, each.wrong, each.repeat]) for each in (self.rates, estimated))
+        if np.abs(np.log(new / old)).max() < np.log(RATE_FACTOR):
+            self.rates = Rates(self.rates.slip, self.rates.wrong, self.rates.repeat, estimated.share)
+            return
+        self.rates = estimated
+        for candidate in self._candidates:
+            candidate.rescore(self.trials, self._owner_indices, self.rates)

@@ -1,0 +1,92 @@
+"""How probable whole trials are under a structure, and what they teach of the contents of their objects."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from atg_fg.core.assumptions import Assumptions
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.patterns import Evidence, FloatArray, PatternAlphabet
+from atg_fg.inference.chain import History, build_chain, forward_pass
+from atg_fg.learning.pose_filter import PoseFilter
+from atg_fg.learning.rates import Rates
+from atg_fg.learning.raw_trials import NOT_SEEN, RawTrial, TrialArrays, side_by_side
+from atg_fg.learning.shared_structure import SharedStructure
+
+#: Noise of the plain ATG that a structure has to explain trials better than.
+PLAIN = ModelParameters(1e-6, 1e-6, learn_in_trial=True)
+
+
+class TrialScores(NamedTuple):
+    """What N trials say under a structure.
+
+    Attributes:
+        log_evidence: ln p(trial | structure, what was known of its object), shape [N].
+        events: Expected slips, wrong looks, repeated symbols and revealed registers, shape [N, 4].
+        contents: What is known of the objects after the trials, shape [N, P, S].
+    """
+
+    log_evidence: FloatArray
+    events: FloatArray
+    contents: FloatArray
+
+
+def score_trials(
+    structure: SharedStructure,
+    trials: Sequence[RawTrial],
+    rates: Rates,
+    alphabet: PatternAlphabet,
+    contents: FloatArray | None = None,
+) -> TrialScores:
+    """Return what trials say under a structure.
+
+    Args:
+        structure: With at most as many poses as a structure may have.
+        trials: Raw trials of N objects.
+        rates: Slip, wrong looks and repeated symbols.
+        alphabet: The patterns.
+        contents: What is known of the objects before, shape [N, P, S]; nothing if not given: fresh objects.
+    """
+    shape = (len(trials), structure.n_registers, alphabet.n_symbols)
+    before = np.zeros(shape) if contents is None else contents
+    scores = TrialScores(np.zeros(len(trials)), np.zeros((len(trials), 4)), before.copy())
+    by_length: defaultdict[int, list[int]] = defaultdict(list)
+    for number, trial in enumerate(trials):
+        by_length[len(trial.actions)].append(number)
+    for numbers in by_length.values():
+        own = PoseFilter(structure.poses(), before[numbers], rates, alphabet)
+        follow(own, side_by_side([trials[number] for number in numbers]), alphabet)
+        scores.log_evidence[numbers] = own.log_evidence
+        scores.events[numbers] = own.expected_events()
+        for owner, number in enumerate(numbers):
+            learned = own.learned_contents(owner)
+            if learned is not None:
+                scores.contents[number] = learned
+    return scores
+
+
+def follow(own: PoseFilter, trials: TrialArrays, alphabet: PatternAlphabet) -> None:
+    """Let a filter go through trials of the same length, one of each owner."""
+    for look, symbols in enumerate(trials.symbols.transpose(1, 0, 2)):
+        if look:
+            own.act_apart(trials.actions[:, look - 1])
+        if (symbols != NOT_SEEN).all():
+            own.observe_pattern(symbols)
+        else:
+            agrees = (symbols[:, None, :] == NOT_SEEN) | (symbols[:, None, :] == alphabet.symbols)
+            own.observe_likelihood(agrees.all(axis=2).astype(np.float64))
+
+
+# A memory that is read again, as after another process has written, has mostly the same trials.
+@lru_cache(maxsize=4096)
+def plain_log_evidence(trial: RawTrial, assumptions: Assumptions) -> float:
+    """Return ln p(trial) for an object never met that follows no structure: a plain ATG, learned as the trial goes."""
+    evidence = [Evidence.of_detection(assumptions.alphabet, detection) for detection in trial.detections]
+    chain = build_chain(RobotMemory(assumptions), PLAIN, History(evidence, list(trial.actions)))
+    return float(forward_pass(chain).log_joint[-1])

@@ -1,0 +1,130 @@
+"""What a policy imagines where objects may follow structures: the belief after an action and each look.
+
+It answers as ``atg_fg.inference.belief_tree`` does for plain ATGs, from the same filters that follow the trial. What a
+look would reveal of an object's contents is taken into account; nothing is counted into ATGs any more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+
+from atg_fg.core.log_math import x_log_x
+from atg_fg.core.patterns import Evidence, FloatArray, IntArray
+from atg_fg.inference.expected_entropy import expected_entropies_of_table, next_pattern_joint, pattern_table
+from atg_fg.inference.recognition_model import RecognitionModel
+from atg_fg.learning.pose_filter import UNIMPORTANT, PoseFilter
+
+
+class Following(NamedTuple):
+    """Objects that follow one structure.
+
+    Attributes:
+        filter: Over pose and contents of each object and of *unseen*.
+        belief: p(O, the object follows it | …), shape [H].
+    """
+
+    filter: PoseFilter
+    belief: FloatArray
+
+
+class StructureBelief:
+    """A belief over identity, type, present aspect or pose, and contents.
+
+    Args:
+        model: The tables in force for plain ATGs.
+        plain: p(O, X_t, plain), shape [H, W].
+        following: Of each structure.
+        symbols: Symbols of every pattern, shape [|𝒵|, J].
+    """
+
+    def __init__(
+        self, model: RecognitionModel, plain: FloatArray, following: Sequence[Following], symbols: IntArray
+    ) -> None:
+        self.model, self.plain, self.following, self.symbols = model, plain, following, symbols
+
+    @cached_property
+    def identity(self) -> FloatArray:
+        """p(O), shape [H]."""
+        total: FloatArray = self.plain.sum(axis=1)
+        return total + sum((each.belief for each in self.following), np.zeros(len(total)))
+
+    @cached_property
+    def joint(self) -> FloatArray:
+        """J = p(O = i, z | a) for the next look, shape [A, I, |𝒵|], of objects that matter and last of *unseen*."""
+        model = self.model
+        matters = np.union1d(np.flatnonzero(self.identity > UNIMPORTANT), model.n_hypotheses - 1)
+        table = np.zeros((model.n_actions, len(matters), model.n_patterns))
+        if self.plain.sum() > UNIMPORTANT:
+            table += pattern_table(model, next_pattern_joint(model, self.plain), matters)
+        for each in self.following:
+            owners, patterns = each.filter.predicted_patterns()
+            common, places, own = np.intersect1d(matters, owners, assume_unique=True, return_indices=True)
+            table[:, places] += each.belief[common, None] * patterns[:, own]
+        return table
+
+    def expected_entropies(self) -> FloatArray:
+        """Return the expected entropy of identity after one more action (eq. 3) in nats, shape [A]."""
+        return expected_entropies_of_table(self.joint, float(self.identity[-1]), self.model.n_unseen)
+
+    def after(self, action: int) -> StructureLooks:
+        """Return what may be seen after an action."""
+        return StructureLooks(self, action)
+
+
+class StructureLooks:
+    """The looks that an action may lead to, one a pattern.
+
+    Args:
+        before: The belief before the action.
+        action: Its index.
+    """
+
+    def __init__(self, before: StructureBelief, action: int) -> None:
+        self._before, self._action = before, action
+        self._joint = before.joint[action]
+
+    @property
+    def probabilities(self) -> FloatArray:
+        """Return p(z | a), shape [|𝒵|]."""
+        probabilities: FloatArray = self._joint.sum(axis=0) / self._joint.sum()
+        return probabilities
+
+    @property
+    def entropies(self) -> FloatArray:
+        """Return H(O | z, a) in nats, shape [|𝒵|]; 0 of an impossible look."""
+        total = self._joint.sum(axis=0)
+        weighted = x_log_x(total) - x_log_x(self._joint).sum(axis=0)
+        weighted += self._joint[-1] * np.log(self._before.model.n_unseen)
+        entropies: FloatArray = np.divide(np.maximum(weighted, 0.0), total, out=np.zeros_like(total), where=total > 0)
+        return entropies
+
+    def expected_entropies(self, looks: IntArray) -> FloatArray:
+        """Return the expected entropies after each of some looks [N] and one more action, in nats, shape [N, A]."""
+        return np.array([self.belief(int(look)).expected_entropies() for look in looks])
+
+    def belief(self, look: int) -> StructureBelief:
+        """Return the belief after a look of probability above 0."""
+        before, model = self._before, self._before.model
+        seen = Evidence((np.arange(model.n_patterns) == look).astype(np.float64), look)
+        plain = model.predict(before.plain, self._action) * model.likelihood(seen)
+        following = [self._followed(each, look) for each in before.following]
+        total = plain.sum() + sum(each.belief.sum() for each in following)
+        return StructureBelief(
+            model,
+            plain / total,
+            [Following(each.filter, each.belief / total) for each in following],
+            before.symbols,
+        )
+
+    def _followed(self, following: Following, look: int) -> Following:
+        imagined = following.filter.copy()
+        imagined.act(self._action)
+        imagined.observe_pattern(self._before.symbols[look])
+        possible = np.isfinite(imagined.log_evidence)  # what has been ruled out stays so
+        gained = np.full(len(possible), -np.inf)
+        np.subtract(imagined.log_evidence, following.filter.log_evidence, out=gained, where=possible)
+        return Following(imagined, following.belief * np.exp(gained))

@@ -1,0 +1,109 @@
+"""A trial of objects that follow a structure as a chain whose aspects are the poses: the factor graph of a structure.
+
+Given what the registers contain, the pose is all there is to know: X_t is the pose, an action turns it or slips, and a
+look shows the contents of the registers in view. So the tables are those of any other recognition trial, and
+``RecognitionGraph`` takes them as they are.
+"""
+
+from __future__ import annotations
+
+import itertools
+from typing import Final
+
+import numpy as np
+
+from atg_fg.core.errors import InvalidInputError, TooLargeError
+from atg_fg.core.patterns import Evidence, FloatArray, PatternAlphabet
+from atg_fg.inference.chain import Chain, History, forward_pass
+from atg_fg.learning import register_contents as soft
+from atg_fg.learning.rates import Rates
+from atg_fg.learning.raw_trials import RawTrial
+from atg_fg.learning.shared_structure import Poses, SharedStructure
+
+MAX_COMPLETIONS: Final = 20_000
+
+
+def pose_patterns(poses: Poses, contents: FloatArray, rates: Rates, alphabet: PatternAlphabet) -> FloatArray:
+    """Return p(pattern | pose, contents) without wrong looks, shape [H, G, |𝒵|].
+
+    Args:
+        poses: Of the structure.
+        contents: Of H objects, shape [H, P, S].
+        rates: Of them κ is used, where a register is not known for certain.
+        alphabet: The patterns.
+    """
+    shown = soft.symbol_probabilities(contents, rates.repeat)
+    in_view = poses.registers[:, : len(alphabet.slots)]
+    by_slot = [shown[:, registers].reshape(-1, alphabet.n_symbols) for registers in in_view.T]
+    different = soft.distinctness(by_slot, alphabet.symbols)
+    patterns: FloatArray = soft.pattern_products(by_slot, alphabet.symbols) / different[:, None]
+    possible = poses.possible(len(alphabet.slots))[:, None]
+    return patterns.reshape(len(contents), len(poses.registers), len(alphabet)) * possible
+
+
+def pose_chain(
+    poses: Poses, contents: FloatArray, prior: FloatArray, rates: Rates, alphabet: PatternAlphabet, history: History
+) -> Chain:
+    """Return the chain of a trial: O is which of H objects it is, X_s the pose.
+
+    It is exact for objects whose contents are known. Registers that are not known count as drawn anew at each look.
+
+    Args:
+        poses: Of the structure.
+        contents: Of the objects, shape [H, P, S].
+        prior: p(O), shape [H].
+        rates: Slip, wrong looks and repeated symbols.
+        alphabet: The patterns.
+        history: What was seen and done; at least one look.
+    """
+    if not history.evidence:
+        raise InvalidInputError("trial: nothing observed yet; expected a first observation")
+    n_objects, n_poses = len(contents), len(poses.registers)
+    shown = pose_patterns(poses, contents, rates, alphabet)
+    turns = [_transition(poses, action, rates.slip) for action in range(poses.successors.shape[1])]
+    return Chain(
+        prior,
+        np.full((n_objects, n_poses), 1.0 / n_poses),
+        tuple(np.broadcast_to(turns[action], (n_objects, n_poses, n_poses)) for action in history.actions),
+        tuple(
+            (1.0 - rates.wrong) * (shown @ evidence.likelihood)
+            + rates.wrong / len(alphabet) * evidence.likelihood.sum()
+            for evidence in history.evidence
+        ),
+    )
+
+
+def _transition(poses: Poses, action: int, slip: float) -> FloatArray:
+    """Return p(next pose | pose, action), shape [G, G]."""
+    table = slip * np.eye(len(poses.successors))
+    table[np.arange(len(table)), poses.successors[:, action]] += 1.0 - slip
+    return table
+
+
+def completions(structure: SharedStructure, alphabet: PatternAlphabet) -> FloatArray:
+    """Return all contents with a different symbol in each register, each of the same probability, shape [H, P, S].
+
+    Raises:
+        TooLargeError: There are more than ``MAX_COMPLETIONS``.
+    """
+    number = 1
+    for register in range(structure.n_registers):
+        number *= alphabet.n_symbols - register
+        if number > MAX_COMPLETIONS:
+            raise TooLargeError(f"contents: more than {MAX_COMPLETIONS} possible; expected fewer registers or symbols")
+    symbols = np.array(list(itertools.permutations(range(alphabet.n_symbols), structure.n_registers)), dtype=np.int64)
+    return np.eye(alphabet.n_symbols)[symbols]
+
+
+def exact_log_evidence(structure: SharedStructure, trial: RawTrial, rates: Rates, alphabet: PatternAlphabet) -> float:
+    """Return ln p(trial | structure, a fresh object without repeated symbols), summed over all its contents.
+
+    What ``score_trials`` approximates, for small cases. Raises ``TooLargeError`` for others.
+    """
+    contents = completions(structure, alphabet)
+    history = History(
+        [Evidence.of_detection(alphabet, detection) for detection in trial.detections], list(trial.actions)
+    )
+    prior = np.full(len(contents), 1.0 / max(len(contents), 1))
+    joint = forward_pass(pose_chain(structure.poses(), contents, prior, rates, alphabet, history)).log_joint
+    return float(np.logaddexp.reduce(joint))

@@ -1,0 +1,335 @@
+"""A Bayes filter over pose and contents of objects that follow a known structure, many objects side by side.
+
+What is believed of an object is a set of rows: a pose, its probability, and a soft table of contents given that pose.
+A look weighs the rows and reveals registers; an action turns each pose, and leaves a second row behind for a slip. Rows
+of one object that come to the same pose become one, whose table has their mean. That is the approximation: the rest of
+what they knew, how registers depend on each other and on the way the pose was reached, is given up. The rows of a known
+object all have one table, and of a new one that never slips no two that began alike are in one pose: both are filtered
+exactly.
+"""
+
+from __future__ import annotations
+
+import copy
+from typing import Final, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atg_fg.core.log_math import log_sum_exp
+from atg_fg.core.patterns import FloatArray, IntArray, PatternAlphabet
+from atg_fg.learning import register_contents as soft
+from atg_fg.learning.rates import Rates
+from atg_fg.learning.shared_structure import Poses
+
+#: Rows less probable than this are dropped.
+NEGLIGIBLE: Final = 1e-9
+
+
+#: Rows less probable than this are left out of what is predicted for planning.
+UNIMPORTANT: Final = 1e-6
+
+
+#: A row that is by no more than this above one half is not preferred to the others.
+EVEN: Final = 1e-3
+
+
+#: Columns of ``Rows.events``.
+SLIP, WRONG, REPEAT, REVEAL = range(4)
+
+
+_ONE_SLIP: Final = np.eye(4)[SLIP]
+
+
+class Rows(NamedTuple):
+    """What is believed, a row for each owner, start and pose that is not negligible, in this order.
+
+    Attributes:
+        owner: The object, or trial, that a row is about, shape [R].
+        start: Which class of poses a new object was in at first, shape [R]; 0 for known ones. What is lost in one pose
+            may be known in the other, so that rows which began apart are kept apart.
+        pose: Shape [R].
+        weight: p(start, pose | owner, what was seen), shape [R].
+        table: Index of the row's table of contents, shape [R]; rows that know the same share one.
+        events: Expected slips, wrong looks, repeated symbols and revealed registers so far, shape [R, 4]; rivals for
+            one trial do without.
+    """
+
+    owner: IntArray
+    start: IntArray
+    pose: IntArray
+    weight: FloatArray
+    table: IntArray
+    events: FloatArray
+
+    def take(self, index: IntArray) -> Rows:
+        """Return the rows with these indices."""
+        return Rows(
+            self.owner[index],
+            self.start[index],
+            self.pose[index],
+            self.weight[index],
+            self.table[index],
+            self.events[index],
+        )
+
+
+class PoseFilter:
+    """Filters the pose of H owners: objects that one trial may be about, or trials that each have their own object.
+
+    Args:
+        poses: Of the structure.
+        contents: What is known of each owner's registers, shape [H, P, S]; all zero for a new object.
+        rates: Slip, wrong looks and repeated symbols.
+        alphabet: The patterns.
+        log_weights: ln of the weight of each owner, shape [H], if they are rivals for one trial, so that rows which
+            are negligible beside those of other owners are dropped. Without, each owner is a trial of its own.
+
+    Attributes:
+        log_evidence: ln p(what was seen | owner), shape [H].
+    """
+
+    def __init__(
+        self,
+        poses: Poses,
+        contents: FloatArray,
+        rates: Rates,
+        alphabet: PatternAlphabet,
+        log_weights: FloatArray | None = None,
+    ) -> None:
+        self._poses, self._rates, self._alphabet = poses, rates, alphabet
+        self._log_weights = log_weights
+        n_owners, n_poses = len(contents), len(poses.registers)
+        # A new object's registers have no names yet, so any pose of a class is as good as another.
+        is_known: NDArray[np.bool_] = np.any(contents, axis=(1, 2))
+        n_first = np.where(is_known, n_poses, len(poses.first))
+        owner = np.repeat(np.arange(n_owners), n_first)
+        position = np.arange(len(owner)) - np.repeat(np.cumsum(n_first) - n_first, n_first)
+        start = np.where(is_known[owner], 0, position)
+        pose = np.where(is_known[owner], position, poses.first[start])
+        weight = np.where(is_known[owner], 1.0 / n_poses, poses.first_weights[start])
+        self.rows = Rows(owner, start, pose, weight, owner, np.zeros((len(owner), 4)))
+        self._contents = contents
+        self._shown = soft.symbol_probabilities(contents, rates.repeat)
+        self._possible = poses.possible(len(alphabet.slots))
+        self.log_evidence = np.zeros(n_owners)
+
+    def copy(self) -> PoseFilter:
+        """Return a filter that goes on alone from here."""
+        twin = copy.copy(self)
+        # All else is replaced at each step rather than changed.
+        twin.log_evidence = self.log_evidence.copy()
+        return twin
+
+    def act(self, action: int) -> None:
+        """Take in an action."""
+        self.act_apart(np.full(len(self.log_evidence), action))
+
+    def act_apart(self, actions: IntArray) -> None:
+        """Take in an action of each owner, shape [H]."""
+        rows, slip = self.rows, self._rates.slip
+        moved = rows._replace(
+            pose=self._poses.successors[rows.pose, actions[rows.owner]], weight=rows.weight * (1.0 - slip)
+        )
+        stayed = rows._replace(weight=rows.weight * slip, events=rows.events + _ONE_SLIP)
+        self.rows = Rows(*(np.concatenate(pair) for pair in zip(moved, stayed, strict=True)))
+
+    def observe_pattern(self, symbols: IntArray) -> None:
+        """Take in looks that showed every slot, shape [J], or [H, J] for a look of each owner."""
+        rows = self.rows
+        seen = np.broadcast_to(symbols, (len(self.log_evidence), symbols.shape[-1]))[rows.owner]
+        registers, shown = self._in_view(rows)
+        probability = self._possible[rows.pose] / soft.distinctness(shown, self._alphabet.symbols)
+        index = np.arange(len(rows.owner))
+        for slot, probabilities in enumerate(shown):
+            probability *= probabilities[index, seen[:, slot]]
+        kept, truth = self._condition(probability, np.ones(1))
+        right = np.flatnonzero(truth > soft.SAME)
+        source, tables = kept[right], self._contents[self.rows.table[right]]
+        seen, index = seen[source], np.arange(len(right))
+        known = np.ones(len(right), dtype=bool)
+        for slot, probabilities in enumerate(shown):
+            register, expected = registers[source, slot], probabilities[source]
+            before = tables[index, register]
+            known &= before[index, seen[:, slot]] > 1.0 - soft.SAME
+            tables[index, register], revealed = soft.reveal(before, expected, seen[:, slot], truth[right])
+            self._count_reveals(right, before, expected, revealed)
+        self._merge(tables[~known], right[~known])
+
+    def observe_likelihood(self, likelihood: FloatArray) -> None:
+        """Take in any evidence as a likelihood of each pattern, shape [|𝒵|], or [H, |𝒵|] for a look of each owner."""
+        rows, symbols = self.rows, self._alphabet.symbols
+        likelihood = np.broadcast_to(likelihood, (len(self.log_evidence), len(symbols)))
+        registers, shown = self._in_view(rows)
+        joint = soft.pattern_products(shown, symbols) / soft.distinctness(shown, symbols)[:, None]
+        joint *= self._possible[rows.pose, None] * likelihood[rows.owner]
+        probability = joint.sum(axis=1)
+        kept, truth = self._condition(probability, likelihood.sum(axis=1))
+        right = np.flatnonzero(truth > soft.SAME)
+        source, tables = kept[right], self._contents[self.rows.table[right]]
+        joint = joint[source] / probability[source, None]
+        one_hot = [symbols[:, slot, None] == np.arange(self._alphabet.n_symbols) for slot in range(len(shown))]
+        posteriors = [joint @ each.astype(np.float64) for each in one_hot]
+        index = np.arange(len(right))
+        for slot, posterior in enumerate(posteriors):
+            register, expected = registers[source, slot], shown[slot][source]
+            before = tables[index, register]
+            taken = sum((each for other, each in enumerate(posteriors) if other != slot), np.zeros_like(posterior))
+            tables[index, register], revealed = soft.reweigh(before, expected, posterior, taken, truth[right])
+            self._count_reveals(right, before, expected, revealed)
+        self._merge(tables, right)
+
+    def predicted_patterns(self) -> tuple[IntArray, FloatArray]:
+        """Return the owners that matter, shape [I], and p(next pattern | action, owner) of each, shape [A, I, |𝒵|]."""
+        rows = self.rows.take(np.flatnonzero(self.rows.weight * self._importance()[self.rows.owner] > UNIMPORTANT))
+        first, group = _runs(rows.owner)
+        weights = rows.weight / np.add.reduceat(rows.weight, first)[group]
+        stayed = self._patterns_of(rows, weights * self._rates.slip, first)
+        moved = [
+            self._patterns_of(rows._replace(pose=successors), weights * (1.0 - self._rates.slip), first)
+            for successors in self._poses.successors[rows.pose].T
+        ]
+        noise = self._rates.wrong / len(self._alphabet)
+        return rows.owner[first], (1.0 - self._rates.wrong) * (np.array(moved) + stayed) + noise
+
+    def shown_patterns(self) -> tuple[IntArray, FloatArray]:
+        """Return the owners that matter, shape [I], and p(pattern shown now | owner) of each, shape [I, |𝒵|]."""
+        rows = self.rows.take(np.flatnonzero(self.rows.weight * self._importance()[self.rows.owner] > UNIMPORTANT))
+        first, group = _runs(rows.owner)
+        weights = rows.weight / np.add.reduceat(rows.weight, first)[group]
+        return rows.owner[first], self._patterns_of(rows, weights, first)
+
+    def poses_of(self, owner: int) -> dict[int, float]:
+        """Return the probability of each pose of an owner that is not negligible."""
+        own = np.flatnonzero(self.rows.owner == owner)
+        weight = np.bincount(self.rows.pose[own], self.rows.weight[own])
+        there = np.unique(self.rows.pose[own])
+        return dict(zip(there.tolist(), (weight[there] / weight.sum()).tolist(), strict=True))
+
+    def learned_contents(self, owner: int) -> FloatArray | None:
+        """Return the table of an owner's most probable row if it is more so than all others, else their mean, [P, S].
+
+        ``None`` if the owner has been ruled out.
+        """
+        own = np.flatnonzero(self.rows.owner == owner)
+        if not len(own):
+            return None
+        weight, table = self.rows.weight[own], self.rows.table[own]
+        best = int(weight.argmax())
+        if weight[best] > (0.5 + EVEN) * weight.sum():
+            table = table[[best]]
+            weight = np.ones(1)
+        mean: FloatArray = np.einsum("r,rps->ps", weight / weight.sum(), self._contents[table])
+        return mean
+
+    def expected_events(self) -> FloatArray:
+        """Return the expected slips, wrong looks, repeated symbols and revealed registers of each owner, [H, 4]."""
+        events = np.zeros((len(self.log_evidence), 4))
+        np.add.at(events, self.rows.owner, self.rows.weight[:, None] * self.rows.events)
+        return events
+
+    def _in_view(self, rows: Rows) -> tuple[IntArray, list[FloatArray]]:
+        """Return the registers in the J slots, shape [R, J], and the symbols' probabilities in each, J × [R, S]."""
+        registers = self._poses.registers[rows.pose, : len(self._alphabet.slots)]
+        return registers, [self._shown[rows.table, register] for register in registers.T]
+
+    def _condition(self, probability: FloatArray, scale: FloatArray) -> tuple[IntArray, FloatArray]:
+        """Weigh the rows by a look, drop the negligible ones, and count how many looks were wrong.
+
+        Args:
+            probability: Of the look under each row if it is not wrong, shape [R].
+            scale: The look's sum over patterns, for each owner or for all, shape [H] or [1].
+
+        Returns:
+            Which rows are left, and how probable it is that the look was not wrong under each of them.
+        """
+        rows, n_owners = self.rows, len(self.log_evidence)
+        right = (1.0 - self._rates.wrong) * probability
+        wrong = self._rates.wrong / len(self._alphabet) * np.broadcast_to(scale, n_owners)[rows.owner]
+        weight = rows.weight * (right + wrong)
+        total = np.bincount(rows.owner, weight, n_owners)
+        self.log_evidence += np.log(total, out=np.full(n_owners, -np.inf), where=total > 0)
+        weight = weight / np.maximum(total, np.finfo(float).tiny)[rows.owner]
+        kept = np.flatnonzero(weight * self._importance()[rows.owner] > NEGLIGIBLE)
+        truth = right[kept] / (right + wrong)[kept]
+        self.rows = rows._replace(weight=weight).take(kept)
+        self.rows.events[:, WRONG] += 1.0 - truth
+        return kept, truth
+
+    def _importance(self) -> FloatArray:
+        """Return the weight of each owner relative to the greatest, shape [H]; one for each that has no rivals."""
+        if self._log_weights is None:
+            return np.ones(len(self.log_evidence))
+        logarithms = self._log_weights + self.log_evidence
+        total = log_sum_exp(logarithms)
+        return np.exp(logarithms - total) if np.isfinite(total) else np.zeros_like(logarithms)
+
+    def _count_reveals(self, rows: IntArray, before: FloatArray, shown: FloatArray, revealed: FloatArray) -> None:
+        """Count how probably a slot's register was revealed by a look, and its symbol drawn from all symbols.
+
+        Rivals for one trial are not counted for.
+
+        Args:
+            rows: Index of each of the rows in question, shape [I].
+            before: The register's table, shape [I, S].
+            shown: The probability of each of its symbols, shape [I, S].
+            revealed: The probability that it was revealed and has a symbol, shape [I, S].
+        """
+        if self._log_weights is not None:
+            return
+        from_all = self._rates.repeat / self._alphabet.n_symbols * soft.unrevealed(before[:, None, :])
+        share = np.minimum(from_all / np.maximum(shown - before, soft.TINY), 1.0)
+        self.rows.events[rows, REVEAL] += revealed.sum(axis=1)
+        self.rows.events[rows, REPEAT] += (revealed * share).sum(axis=1)
+
+    def _merge(self, tables: FloatArray, changed: IntArray) -> None:
+        """Make one row of those with the same owner, start and pose, and keep each different table once.
+
+        Args:
+            tables: New ones, shape [I, P, S].
+            changed: Index of the row that each belongs to, shape [I].
+        """
+        rows, n_old = self.rows, len(self._contents)
+        contents = [self._contents, tables]
+        table = rows.table.copy()
+        table[changed] = n_old + np.arange(len(changed))
+        key = (rows.owner * len(self._poses.first) + rows.start) * len(self._poses.registers) + rows.pose
+        order = np.argsort(key, kind="stable")
+        first, group = _runs(key[order])
+        weight = np.add.reduceat(rows.weight[order], first)
+        share = rows.weight[order] / np.maximum(weight, np.finfo(float).tiny)[group]
+        events = np.add.reduceat(rows.events[order] * share[:, None], first)
+        merged = np.minimum.reduceat(table[order], first)
+        mixed = merged != np.maximum.reduceat(table[order], first)
+        if mixed.any():
+            members = np.flatnonzero(mixed[group])
+            starts, _ = _runs(group[members])
+            own = np.concatenate(contents)[table[order[members]]]
+            contents.append(np.add.reduceat(own * share[members][:, None, None], starts))
+            merged[mixed] = n_old + len(changed) + np.arange(len(starts))
+        used, table = np.unique(merged, return_inverse=True)
+        self._contents = np.concatenate(contents)[used]
+        shown = soft.symbol_probabilities(self._contents[used >= n_old], self._rates.repeat)
+        self._shown = np.concatenate((self._shown[used[used < n_old]], shown))
+        last = order[first]
+        self.rows = Rows(rows.owner[last], rows.start[last], rows.pose[last], weight, table, events)
+
+    def _patterns_of(self, rows: Rows, weights: FloatArray, first: IntArray) -> FloatArray:
+        """Return the weighted sum of what rows show, for each owner, shape [I, |𝒵|]."""
+        _, shown = self._in_view(rows)
+        symbols = self._alphabet.symbols
+        shown[0] = shown[0] * (weights * self._possible[rows.pose] / soft.distinctness(shown, symbols))[:, None]
+        combined = shown[0]
+        for probabilities in shown[1:]:
+            combined = (combined[:, :, None] * probabilities[:, None, :]).reshape(len(combined), -1)
+        by_owner = np.add.reduceat(combined, first)
+        places = np.ravel_multi_index(tuple(symbols.T), (self._alphabet.n_symbols,) * symbols.shape[1])
+        patterns: FloatArray = by_owner[:, places]
+        return patterns
+
+
+def _runs(values: IntArray) -> tuple[IntArray, IntArray]:
+    """Return where each run of equal values begins, and for each value the number of its run; at least one value."""
+    begins = np.ones(len(values), dtype=bool)
+    np.not_equal(values[1:], values[:-1], out=begins[1:])
+    return np.flatnonzero(begins), np.cumsum(begins) - 1

@@ -1,0 +1,73 @@
+"""Raw trials, as detections and actions, and many of them in one array."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from atg_fg.core.assumptions import Assumptions
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.patterns import Detection, IntArray
+
+#: A slot in which nothing was seen.
+NOT_SEEN: Final = -1
+
+
+@dataclass(frozen=True)
+class RawTrial:
+    """What was seen and done with one object.
+
+    Attributes:
+        detections: The symbol in each slot at each look, ``None`` where nothing was seen; t + 1 of them.
+        actions: Index of the action between each two looks; t of them.
+    """
+
+    detections: tuple[Detection, ...]
+    actions: tuple[int, ...]
+
+    def check(self, assumptions: Assumptions, place: str = "trial") -> None:
+        """Raise ``InvalidInputError``, naming ``place``, if this is no trial under these assumptions."""
+        if len(self.detections) != len(self.actions) + 1:
+            raise InvalidInputError(
+                f"{place}: {len(self.detections)} looks, {len(self.actions)} actions; expected one look more"
+            )
+        for look, detection in enumerate(self.detections):
+            assumptions.alphabet.check_detection(detection, f"{place}: look {look}")
+        for action in self.actions:
+            if not 0 <= action < len(assumptions.actions):
+                raise InvalidInputError(f"{place}: action {action}; expected 0 to {len(assumptions.actions) - 1}")
+
+    def pieces(self, n_actions: int) -> list[RawTrial]:
+        """Return this trial cut into pieces of at most ``n_actions`` actions; a cut loses the action at it."""
+        return [
+            RawTrial(self.detections[first : first + n_actions + 1], self.actions[first : first + n_actions])
+            for first in range(0, len(self.detections), n_actions + 1)
+        ]
+
+
+class TrialArrays(NamedTuple):
+    """N trials side by side, as long as the longest of them.
+
+    Attributes:
+        symbols: Seen in each slot at each look, ``NOT_SEEN`` where nothing was or the trial has ended, [N, T + 1, J].
+        actions: Between the looks, −1 where the trial has ended, shape [N, T].
+    """
+
+    symbols: IntArray
+    actions: IntArray
+
+
+def side_by_side(trials: Sequence[RawTrial]) -> TrialArrays:
+    """Return trials, at least one, as arrays."""
+    longest = max(len(trial.actions) for trial in trials)
+    n_slots = len(trials[0].detections[0])
+    symbols = np.full((len(trials), longest + 1, n_slots), NOT_SEEN, dtype=np.int64)
+    actions = np.full((len(trials), longest), -1, dtype=np.int64)
+    for number, trial in enumerate(trials):
+        seen = [[NOT_SEEN if symbol is None else symbol for symbol in look] for look in trial.detections]
+        symbols[number, : len(seen)] = seen
+        actions[number, : len(trial.actions)] = trial.actions
+    return TrialArrays(symbols, actions)

@@ -1,0 +1,1 @@
+"""What is on disk: memories, logs of trials, presets, and the formats of other tools."""

@@ -1,0 +1,165 @@
+"""A compact memory as a file of arrays (``.npz``), checked when it is read, and written whole or not at all."""
+
+from __future__ import annotations
+
+import io
+import json
+import zipfile
+import zlib
+from pathlib import Path
+from typing import Final
+
+import numpy as np
+
+from atg_fg.core.assumptions import MAX_NUMBER, Assumptions
+from atg_fg.core.compact.columns import AnyIntArray
+from atg_fg.core.compact.compact_memory import CompactMemory, GraphArrays, compacted
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.patterns import IntArray
+from atg_fg.storage.checked_json import check_format, parse_json, placed, read_list, read_object, read_text
+from atg_fg.storage.memory_json import read_assumptions, write_assumptions
+from atg_fg.storage.plain_files import write_bytes_atomically
+
+COMPACT_FORMAT: Final = "atg-fg/compact-memory"
+
+
+#: What NumPy raises on files that are no sound archives of arrays.
+_UNSOUND: Final = (
+    OSError,
+    ValueError,
+    KeyError,
+    EOFError,
+    MemoryError,
+    OverflowError,
+    SyntaxError,
+    TypeError,
+    NotImplementedError,
+    zipfile.BadZipFile,
+    zlib.error,
+)
+
+
+#: How files of arrays are told from others.
+SUFFIX: Final = ".npz"
+
+
+def is_compact(path: Path | str) -> bool:
+    """Return whether a memory is a file of arrays, by its name."""
+    return Path(path).suffix == SUFFIX
+
+
+def save_compact_memory(memory: CompactMemory, path: Path | str) -> None:
+    """Save a compact memory, atomically.
+
+    Raises:
+        InvalidInputError: The file cannot be written.
+    """
+    header = {
+        "format": COMPACT_FORMAT,
+        "version": 1,
+        "assumptions": write_assumptions(memory.assumptions),
+        "names": list(memory.names),
+    }
+    text = np.frombuffer(json.dumps(header).encode(), dtype=np.uint8)
+    file = io.BytesIO()
+    np.savez(file, header=text, **memory.arrays()._asdict())
+    write_bytes_atomically(path, file.getvalue())
+
+
+def load_compact_memory(path: Path | str) -> CompactMemory:
+    """Load a compact memory.
+
+    Raises:
+        InvalidInputError: Unreadable, not such a file, or anything in it is not as it should be; the message names the
+            place.
+    """
+    place = str(path)
+    read = _read_arrays(path, place)
+    try:
+        text = read.pop("header").astype(np.uint8).tobytes().decode()
+    except ValueError as error:
+        raise InvalidInputError(f"{place}: header: not a UTF-8 text: {error}") from error
+    header = read_object(parse_json(text, f"{place}: header"), place, ("format", "version", "assumptions", "names"))
+    check_format(header, COMPACT_FORMAT, place)
+    assumptions = read_assumptions(header["assumptions"], f"{place}: assumptions")
+    names = read_list(header["names"], f"{place}: names")
+    for number, name in enumerate(names):
+        read_text(name, f"{place}: names[{number}]")
+    if len(set(names)) < len(names):
+        raise InvalidInputError(f"{place}: names: one is repeated; expected unique names")
+    arrays = GraphArrays(**read)
+    with placed(place):
+        check_arrays(arrays, assumptions, len(names))
+    return CompactMemory.of_arrays(assumptions, names, compacted(arrays, assumptions))
+
+
+def _read_arrays(path: Path | str, place: str) -> dict[str, AnyIntArray]:
+    """Return the arrays of a file by name: those of ``GraphArrays`` and the header, all of whole numbers."""
+    expected = {"header", *GraphArrays._fields}
+    try:
+        content = Path(path).read_bytes()
+    except OSError as error:
+        raise InvalidInputError(f"{place}: cannot be read: {error.strerror}") from error
+    try:
+        file = np.load(io.BytesIO(content), allow_pickle=False)
+        found = set(file.files) if isinstance(file, np.lib.npyio.NpzFile) else set()
+        arrays: dict[str, AnyIntArray] = {name: file[name] for name in found}
+    except _UNSOUND as error:
+        raise InvalidInputError(f"{place}: not a sound file of arrays: {error}") from error
+    if found != expected:
+        raise InvalidInputError(f"{place}: not a compact memory; expected arrays {', '.join(sorted(expected))}")
+    for name, array in arrays.items():
+        if not isinstance(array, np.ndarray) or array.ndim != 1 or array.dtype.kind not in "iu":
+            kind = f"{array.ndim} dimensions of {array.dtype}" if isinstance(array, np.ndarray) else "no array"
+            raise InvalidInputError(f"{place}: {name}: {kind}; expected one dimension of whole numbers")
+    return arrays
+
+
+def check_arrays(arrays: GraphArrays, assumptions: Assumptions, n_objects: int) -> None:
+    """Raise ``InvalidInputError`` unless these arrays are ``n_objects`` ATGs under the assumptions."""
+    n_aspects, n_actions = assumptions.n_aspects, len(assumptions.actions)
+    for name in ("n_known", "n_edges"):
+        _check_length(name, getattr(arrays, name), n_objects)
+    _check_range("n_known", arrays.n_known, 0, n_aspects)
+    _check_range("n_edges", arrays.n_edges, 0, MAX_NUMBER)
+    n_known, n_edges = arrays.n_known.astype(np.int64), arrays.n_edges.astype(np.int64)
+    _check_length("patterns", arrays.patterns, sum(n_known.tolist()))
+    for name in ("source", "action", "target", "counts"):
+        _check_length(name, getattr(arrays, name), sum(n_edges.tolist()))
+    _check_range("patterns", arrays.patterns, 0, len(assumptions.alphabet) - 1)
+    _check_range("action", arrays.action, 0, n_actions - 1)
+    _check_range("counts", arrays.counts, 1, MAX_NUMBER)
+    owner = np.repeat(np.arange(n_objects), n_edges)
+    for name in ("source", "target"):
+        aspects = getattr(arrays, name)
+        _check_range(name, aspects, 0, n_aspects - 1)
+        wrong = np.flatnonzero(aspects >= n_known[owner])
+        if len(wrong):
+            first = int(wrong[0])
+            raise InvalidInputError(
+                f"{name}[{first}]: aspect {aspects[first]}; expected less than the {n_known[owner[first]]} known ones"
+            )
+    shown_by = np.repeat(np.arange(n_objects), n_known)
+    _check_unique("patterns", shown_by, arrays.patterns.astype(np.int64), "unique patterns in an ATG")
+    local = (arrays.source.astype(np.int64) * n_actions + arrays.action) * n_aspects + arrays.target
+    _check_unique("source", owner, local, "each transition of an ATG once")
+
+
+def _check_length(name: str, array: AnyIntArray, expected: int) -> None:
+    if len(array) != expected:
+        raise InvalidInputError(f"{name}: {len(array)} entries; expected {expected}")
+
+
+def _check_range(name: str, array: AnyIntArray, least: int, most: int) -> None:
+    wrong = np.flatnonzero((array < least) | (array > most))
+    if len(wrong):
+        first = int(wrong[0])
+        raise InvalidInputError(f"{name}[{first}]: {array[first]}; expected {least} to {most}")
+
+
+def _check_unique(name: str, owner: IntArray, local: IntArray, expected: str) -> None:
+    """Check that no owner has a local number twice; owners are ascending."""
+    order = np.lexsort((local, owner))
+    again = np.flatnonzero((np.diff(owner[order]) == 0) & (np.diff(local[order]) == 0))
+    if len(again):
+        raise InvalidInputError(f"{name}[{int(order[again[0] + 1])}]: repeated; expected {expected}")

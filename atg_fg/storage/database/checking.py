@@ -1,0 +1,99 @@
+"""All that is wrong with a memory database: its pages, its references, and what it says."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterator
+from pathlib import Path
+
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.records import StoredTrial
+from atg_fg.storage.database.connection import open_to_read, translated
+from atg_fg.storage.database.memory_reading import holds_memory, read_memory_rows
+from atg_fg.storage.database.trial_rows import read_experiments, read_trials
+
+#: Faults of one kind after which no more are looked for.
+MAX_FAULTS = 20
+
+
+def faults_of_database(path: Path | str) -> list[str]:
+    """Return what is wrong with a database, a line each; nothing if it is sound.
+
+    Pages and indices (``PRAGMA integrity_check``), references (``PRAGMA foreign_key_check``), the memory as it is read
+    for use, and every experiment and trial.
+
+    Raises:
+        InvalidInputError: It cannot be opened at all, or is no memory database of this version or before.
+    """
+    connection = open_to_read(path)
+    try:
+        faults: list[str] = []
+        for check in (_integrity, _references, _memory, _records):
+            try:
+                with translated(path):
+                    faults += check(connection, str(path))
+            except InvalidInputError as error:
+                faults.append(str(error))
+        return faults
+    finally:
+        connection.close()
+
+
+def _integrity(connection: sqlite3.Connection, place: str) -> Iterator[str]:
+    for (line,) in connection.execute(f"PRAGMA integrity_check({MAX_FAULTS})"):
+        if line != "ok":
+            yield f"{place}: {line}"
+
+
+def _references(connection: sqlite3.Connection, place: str) -> Iterator[str]:
+    for table, row, parent, _ in connection.execute("PRAGMA foreign_key_check").fetchmany(MAX_FAULTS):
+        which = "a row" if row is None else f"row {row}"
+        yield f"{place}: {table}: {which} refers to one of {parent} that is not there"
+
+
+def _memory(connection: sqlite3.Connection, place: str) -> Iterator[str]:
+    if holds_memory(connection):
+        memory = read_memory_rows(connection, place)
+        yield from _strange_records(connection, place, memory)
+
+
+def _strange_records(connection: sqlite3.Connection, place: str, memory: RobotMemory) -> Iterator[str]:
+    """Yield what trials that this memory learned from say that does not fit it."""
+    names = {*memory.names, *(merge.dropped.name for merge in memory.merges)}
+    n_slots, n_symbols = len(memory.assumptions.alphabet.slots), memory.assumptions.alphabet.n_symbols
+    for trial in read_trials(connection, place):
+        if trial.learned is None:
+            continue
+        where = f"{place}: trial {trial.number} of experiment {trial.experiment}"
+        if trial.learned not in names:
+            yield f"{where}: learned: {trial.learned!r}; expected the name of an ATG in this memory"
+        for number, step in enumerate(trial.steps):
+            fits = len(step.observed) == n_slots and all(
+                symbol is None or symbol < n_symbols for symbol in step.observed
+            )
+            if not fits or (step.action is not None and step.action not in memory.assumptions.actions):
+                yield f"{where}: step {number} does not fit the assumptions of this memory"
+
+
+def _records(connection: sqlite3.Connection, place: str) -> Iterator[str]:
+    experiments = list(read_experiments(connection, place))
+    counts = dict.fromkeys((each.number for each in experiments), 0)
+    for trial in read_trials(connection, place):
+        if trial.experiment in counts:
+            expected = counts[trial.experiment]
+            if trial.number != expected:
+                yield f"{place}: experiment {trial.experiment}: trial {trial.number}; expected {expected}"
+            counts[trial.experiment] = trial.number + 1
+        yield from _trial_faults(trial, place)
+
+
+def _trial_faults(trial: StoredTrial, place: str) -> Iterator[str]:
+    where = f"{place}: trial {trial.number} of experiment {trial.experiment}"
+    for number, step in enumerate(trial.steps):
+        if not 0.0 <= step.unseen <= 1.0 + 1e-9 or not step.entropy >= -1e-9:
+            yield f"{where}: step {number}: unseen {step.unseen}, entropy {step.entropy}; expected a belief"
+    if (trial.verdict == "known") != (trial.matched is not None):
+        yield f"{where}: verdict {trial.verdict}, matched {trial.matched!r}; expected a match of what is known only"
+    if (trial.verdict == "lost") != (trial.lost_truth is not None):
+        yield f"{where}: verdict {trial.verdict}; expected the last truth of what is lost only"

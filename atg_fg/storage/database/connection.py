@@ -1,0 +1,185 @@
+"""Opening a memory database, and SQLite's errors as this project's."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Final
+from urllib.parse import quote
+
+from atg_fg.core.errors import BusyMemoryError, InvalidInputError
+from atg_fg.storage.database import schema
+
+#: Seconds that a writer waits for another one to end its transaction.
+WAIT: Final = 5.0
+
+
+_MAGIC: Final = b"SQLite format 3\0"
+
+
+#: No text in a memory is longer; a damaged file may say so.
+_MAX_BYTES: Final = 2**26
+
+
+_WRITING_FAILED: Final = (
+    sqlite3.SQLITE_FULL,
+    sqlite3.SQLITE_READONLY,
+    sqlite3.SQLITE_IOERR,
+    sqlite3.SQLITE_PERM,
+    sqlite3.SQLITE_TOOBIG,
+)
+
+
+def is_database(path: Path | str) -> bool:
+    """Return whether there is an SQLite file at ``path``, whatever its name says."""
+    try:
+        with open(path, "rb") as file:
+            return file.read(len(_MAGIC)) == _MAGIC
+    except (OSError, ValueError):
+        return False
+
+
+@contextmanager
+def translated(place: Path | str) -> Iterator[None]:
+    """Turn errors of SQLite, and of values that it cannot hold, into this project's; the message names ``place``.
+
+    Raises:
+        BusyMemoryError: Another process was writing all the time that this one waited.
+        InvalidInputError: Anything else.
+    """
+    try:
+        yield
+    except sqlite3.Error as error:
+        code = getattr(error, "sqlite_errorcode", 0) & 0xFF
+        if code in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):
+            raise BusyMemoryError(
+                f"{place}: another process is writing to it ({error}); expected it to end, so try again"
+            ) from error
+        if code in _WRITING_FAILED:
+            raise InvalidInputError(f"{place}: cannot be written: {error}; nothing in it was changed") from error
+        if code == sqlite3.SQLITE_CANTOPEN:
+            raise InvalidInputError(
+                f"{place}: cannot be opened: {error}; expected a path in a folder that can be written"
+            ) from error
+        raise InvalidInputError(f"{place}: damaged, or not a memory of atg-fg: {error}") from error
+    except (OverflowError, UnicodeError) as error:
+        raise InvalidInputError(f"{place}: cannot be held in a database: {error}") from error
+
+
+def open_to_read(path: Path | str) -> sqlite3.Connection:
+    """Return a connection that reads; a file of an older version is read as if it were of the present one.
+
+    Raises:
+        InvalidInputError: There is no file, or it is no memory database of this version or before.
+    """
+    _check_file(path)
+    with translated(path):
+        # Not mode=ro: such a connection leaves behind the files that it shares with writers.
+        connection = _connected(path, "mode=rw")
+        try:
+            connection.execute("PRAGMA query_only = ON")
+            try:
+                version = schema.version_of(connection, str(path))
+            except sqlite3.OperationalError:
+                # In a folder that cannot be written SQLite cannot make the files it shares with writers. There are no
+                # writers then; but what they may have left in a log is to be read too.
+                log = Path(f"{path}-wal")
+                if log.exists() and log.stat().st_size > 0:
+                    raise
+                connection.close()
+                connection = _connected(path, "mode=ro&immutable=1")
+                version = schema.version_of(connection, str(path))
+            if version == 0:
+                raise InvalidInputError(f"{path}: an empty database; expected a memory")
+            if version < len(schema.MIGRATIONS):
+                connection = _migrated_copy(connection, path)
+        except BaseException:
+            connection.close()
+            raise
+    return connection
+
+
+def open_to_write(path: Path | str, *, create: bool = False, wait: float = WAIT) -> sqlite3.Connection:
+    """Return a connection that writes; a file of an older version is led to the present one.
+
+    Args:
+        path: The file.
+        create: Make the file if there is none.
+        wait: Seconds to wait for another writer.
+
+    Raises:
+        BusyMemoryError: Another process was writing all that time.
+        InvalidInputError: There is no file, it is no memory database, or it cannot be written.
+    """
+    if not create or Path(path).exists():
+        _check_file(path)
+    with translated(path):
+        connection = _connected(path, "mode=rwc" if create else "mode=rw", wait)
+        try:
+            version = schema.version_of(connection, str(path))
+            connection.execute("PRAGMA journal_mode = WAL").fetchone()
+            # A power cut shall leave each trial that was said to be kept.
+            connection.execute("PRAGMA synchronous = FULL")
+            if version < len(schema.MIGRATIONS):
+                with written(connection):
+                    schema.migrate(connection, str(path))
+        except BaseException:
+            connection.close()
+            raise
+    return connection
+
+
+@contextmanager
+def written(connection: sqlite3.Connection) -> Iterator[None]:
+    """Write what is done inside as one transaction, or nothing of it if there is an error.
+
+    The right to write is taken at once, so that what is read inside is what will be changed.
+    """
+    connection.execute("BEGIN IMMEDIATE")
+    try:
+        yield
+        connection.execute("COMMIT")
+    except BaseException:
+        roll_back(connection)
+        raise
+
+
+def roll_back(connection: sqlite3.Connection) -> None:
+    """End a transaction, if there is one, with nothing changed; SQLite ends some by itself after an error."""
+    if connection.in_transaction:
+        connection.execute("ROLLBACK")
+
+
+def _connected(path: Path | str, mode: str, wait: float = WAIT) -> sqlite3.Connection:
+    uri = f"file:{quote(str(Path(path).absolute()))}?{mode}"
+    connection = sqlite3.connect(uri, uri=True, timeout=wait, isolation_level=None)
+    connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _MAX_BYTES)
+    connection.execute("PRAGMA foreign_keys = ON")
+    # The file may come from anywhere: what it defines must not reach beyond it.
+    connection.execute("PRAGMA trusted_schema = OFF")
+    connection.execute("PRAGMA cell_size_check = ON")
+    return connection
+
+
+def _migrated_copy(connection: sqlite3.Connection, path: Path | str) -> sqlite3.Connection:
+    """Return a copy in RAM with the present tables, since whoever reads must not write."""
+    copy = sqlite3.connect(":memory:", isolation_level=None)
+    connection.backup(copy)
+    connection.close()
+    with written(copy):
+        schema.migrate(copy, str(path))
+    return copy
+
+
+def _check_file(path: Path | str) -> None:
+    """Raise ``InvalidInputError`` if there is no file at ``path``, or one that is neither SQLite's nor empty."""
+    try:
+        with open(path, "rb") as file:
+            head = file.read(len(_MAGIC))
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        raise InvalidInputError(f"{path}: cannot be read: {reason}") from error
+    if head not in (b"", _MAGIC):
+        raise InvalidInputError(f"{path}: not an SQLite file; expected a memory database")

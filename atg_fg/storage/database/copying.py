@@ -1,0 +1,90 @@
+"""Records of trials taken from one file into a database."""
+
+from __future__ import annotations
+
+import sqlite3
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import replace
+from pathlib import Path
+
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.records import Experiment, StoredTrial
+from atg_fg.storage.database import trial_rows
+from atg_fg.storage.database.keeper import software_version
+from atg_fg.storage.database.trial_log import TEST_KIND, read_stored_experiments, read_stored_trials
+from atg_fg.storage.trial_log import read_log
+
+
+def records_in(
+    path: Path | str, renamed: Mapping[str, str] | None = None
+) -> Iterator[tuple[Experiment | None, list[StoredTrial]]]:
+    """Yield the experiments in a database with their trials, and at last the trials that belong to none.
+
+    Args:
+        path: The database.
+        renamed: ATGs that have another name where the records are going.
+
+    Raises:
+        InvalidInputError: It cannot be read, or a record in it is not as it should be.
+    """
+    for experiment in read_stored_experiments(path):
+        trials = read_stored_trials(path, experiment.number)
+        yield replace(experiment, number=0), [_renamed(trial, renamed or {}) for trial in trials]
+    alone = [_renamed(trial, renamed or {}) for trial in read_stored_trials(path) if trial.experiment is None]
+    if alone:
+        yield None, alone
+
+
+def records_in_log(path: Path) -> tuple[Experiment, list[StoredTrial]]:
+    """Return the test in a log of trials (``….jsonl.gz``), and its trials.
+
+    Raises:
+        InvalidInputError: It cannot be read, or is not such a log.
+    """
+    header, lines = read_log(path)
+    seed = header.pop("seed", None)
+    if isinstance(seed, bool) or not isinstance(seed, int):
+        raise InvalidInputError(f"{path}: seed: {seed!r}; expected a whole number")
+    trials = [StoredTrial.of_line(line, f"{path}: trial {number}") for number, line in enumerate(lines)]
+    return Experiment(TEST_KIND, header, seed, software_version()), trials
+
+
+def add_records(
+    connection: sqlite3.Connection, records: Iterable[tuple[Experiment | None, list[StoredTrial]]]
+) -> tuple[int, int]:
+    """Write experiments and trials, but for experiments that are there with the same trials. Inside of a transaction.
+
+    Returns:
+        How many experiments and trials were written.
+    """
+    there = {
+        (_content(each), _digest(trial_rows.read_trials(connection, "records", each.number)))
+        for each in list(trial_rows.read_experiments(connection, "records"))
+    }
+    n_experiments = n_trials = 0
+    for experiment, trials in records:
+        if experiment is not None and (_content(experiment), _digest(trials)) in there:
+            continue
+        number = None if experiment is None else trial_rows.add_experiment(connection, experiment)
+        n_experiments += experiment is not None
+        for trial in trials:
+            trial_rows.add_trial(connection, trial, number)
+            n_trials += 1
+    return n_experiments, n_trials
+
+
+def _renamed(trial: StoredTrial, renamed: Mapping[str, str]) -> StoredTrial:
+    """Return a trial with the new names; the ATGs of one that this memory did not learn from are others."""
+    if trial.learned is None:
+        return trial
+    matched = None if trial.matched is None else renamed.get(trial.matched, trial.matched)
+    return replace(trial, matched=matched, learned=renamed.get(trial.learned, trial.learned))
+
+
+def _content(experiment: Experiment) -> tuple[str, str, int | None]:
+    return experiment.kind, trial_rows.canonical(experiment.parameters), experiment.seed
+
+
+def _digest(trials: Iterable[StoredTrial]) -> str:
+    """Return a text that two experiments share only if their trials went the same way."""
+    return trial_rows.canonical([trial.line() for trial in trials])

@@ -1,0 +1,143 @@
+"""What a database remembers, as the document that memory files hold, so that both are checked by the same code."""
+
+from __future__ import annotations
+
+import sqlite3
+from pathlib import Path
+from typing import Any
+
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.memory import RobotMemory
+from atg_fg.storage.checked_json import parse_json, read_integer, read_object, read_text
+from atg_fg.storage.database.connection import open_to_read, translated
+from atg_fg.storage.memory_json import MEMORY_FORMAT, memory_from_document
+
+
+def load_database(path: Path | str) -> RobotMemory:
+    """Load a robot memory from a database, as it is at one moment, whoever writes to it.
+
+    Raises:
+        InvalidInputError: Unreadable, or anything in it is not as it should be; the message names the place.
+    """
+    with translated(path):
+        connection = open_to_read(path)
+        try:
+            return read_memory_rows(connection, str(path))
+        finally:
+            connection.close()
+
+
+def read_memory_rows(connection: sqlite3.Connection, place: str) -> RobotMemory:
+    """Return the memory behind a connection; errors name ``place``.
+
+    Raises:
+        InvalidInputError: Anything in it is not as it should be.
+        sqlite3.Error: The file cannot be read.
+    """
+    if connection.in_transaction:
+        return memory_from_document(_document(connection, place), place)
+    connection.execute("BEGIN")  # all tables as they are at one moment
+    try:
+        return memory_from_document(_document(connection, place), place)
+    finally:
+        if connection.in_transaction:
+            connection.execute("ROLLBACK")
+
+
+def database_holds_memory(path: Path | str) -> bool:
+    """Return whether a database has a memory.
+
+    Raises:
+        InvalidInputError: It cannot be read.
+    """
+    with translated(path):
+        connection = open_to_read(path)
+        try:
+            return holds_memory(connection)
+        finally:
+            connection.close()
+
+
+def holds_memory(connection: sqlite3.Connection) -> bool:
+    """Return whether a database has a memory, and not only records of trials."""
+    return connection.execute("SELECT 1 FROM assumptions").fetchone() is not None
+
+
+def _document(connection: sqlite3.Connection, place: str) -> dict[str, Any]:
+    numbers = connection.execute("SELECT n_objects, n_aspects, n_symbols FROM assumptions").fetchone()
+    if numbers is None:
+        raise InvalidInputError(f"{place}: holds no memory, only records; expected a database with a memory")
+    actions, slots = (
+        [name for (name,) in connection.execute(f"SELECT name FROM {table} ORDER BY number")]
+        for table in ("actions", "slots")
+    )
+    graphs: dict[Any, dict[str, Any]] = {}
+    for number, position, name in connection.execute("SELECT id, position, name FROM graphs ORDER BY position"):
+        read_integer(position, f"{place}: graphs[{len(graphs)}].position", least=0)
+        graphs[number] = {"name": name, "aspects": [], "transitions": []}
+    _add_aspects(connection, graphs, place)
+    _add_transitions(connection, graphs, actions, place)
+    document: dict[str, Any] = {
+        "format": MEMORY_FORMAT,
+        "version": 1,
+        "assumptions": {
+            **dict(zip(("n_objects", "n_aspects", "n_symbols"), numbers, strict=True)),
+            "actions": actions,
+            "slots": slots,
+        },
+        "memory": list(graphs.values()),
+    }
+    merges = connection.execute("SELECT number, document FROM merges ORDER BY number").fetchall()
+    if merges:
+        document["merges"] = [_json(text, f"{place}: merges[{number!r}]") for number, text in merges]
+    structure = connection.execute("SELECT document FROM structure").fetchone()
+    if structure is not None:
+        document["structure"] = _structure(connection, structure[0], graphs, f"{place}: structure")
+    return document
+
+
+def _add_aspects(connection: sqlite3.Connection, graphs: dict[Any, dict[str, Any]], place: str) -> None:
+    for graph, number, symbols in connection.execute("SELECT graph, number, symbols FROM aspects ORDER BY 1, 2"):
+        aspects = _of(graphs, graph, f"{place}: aspects")["aspects"]
+        where = f"{place}: {graphs[graph]['name']!r}: aspects[{len(aspects)}]"
+        if read_integer(number, where, least=0) != len(aspects):
+            raise InvalidInputError(f"{where}: number {number}; expected {len(aspects)}")
+        aspects.append(_json(symbols, where))
+
+
+def _add_transitions(
+    connection: sqlite3.Connection, graphs: dict[Any, dict[str, Any]], actions: list[Any], place: str
+) -> None:
+    rows = connection.execute("SELECT graph, source, action, target, count FROM transitions ORDER BY 1, 2, 3, 4")
+    for graph, source, action, target, count in rows:
+        transitions = _of(graphs, graph, f"{place}: transitions")["transitions"]
+        where = f"{place}: {graphs[graph]['name']!r}: transitions[{len(transitions)}].action"
+        if read_integer(action, where, least=0) >= len(actions):
+            raise InvalidInputError(f"{where}: {action}; expected 0 to {len(actions) - 1}")
+        transitions.append({"from": source, "action": actions[action], "to": target, "count": count})
+
+
+def _structure(
+    connection: sqlite3.Connection, text: Any, graphs: dict[Any, dict[str, Any]], place: str
+) -> dict[str, Any]:
+    section = read_object(_json(text, place), place, ("seed", "evaluations", "rates", "candidates"))
+    trials: list[dict[str, Any]] = []
+    for number, graph, observed, actions in connection.execute(
+        "SELECT number, graph, observed, actions FROM raw_trials ORDER BY number"
+    ):
+        where = f"{place}.trials[{len(trials)}]"
+        if read_integer(number, where, least=0) != len(trials):
+            raise InvalidInputError(f"{where}: number {number}; expected {len(trials)}")
+        owner = _of(graphs, graph, where)["name"]
+        trials.append({"object": owner, "observed": _json(observed, where), "actions": _json(actions, where)})
+    return {**section, "trials": trials}
+
+
+def _of(graphs: dict[Any, dict[str, Any]], graph: Any, place: str) -> dict[str, Any]:
+    if graph not in graphs:
+        raise InvalidInputError(f"{place}: graph {graph!r}; expected the id of one of the {len(graphs)} graphs")
+    return graphs[graph]
+
+
+def _json(text: Any, place: str) -> Any:
+    return parse_json(read_text(text, place), place)

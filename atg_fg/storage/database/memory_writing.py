@@ -1,0 +1,177 @@
+"""Writing a memory into a database: all of it, or what has changed since it was written last."""
+
+from __future__ import annotations
+
+import json
+import sqlite3
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+from atg_fg.core.aspect_graph import AspectTransitionGraph
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.merging import Merge
+from atg_fg.learning.structured_memory import StructuredMemory
+from atg_fg.storage.memory_json import write_merge
+from atg_fg.storage.structure_json import write_learner
+
+
+@dataclass(frozen=True)
+class Held:
+    """What a database holds of a memory, so that only what is different is written.
+
+    A memory never changes an ATG that it has, but has another one of this name instead; so an ATG that is the same
+    object is the same in the file.
+
+    Attributes:
+        graphs: The ATGs by name, in their order.
+        ids: The number of each in the database.
+        positions: The place of each in the order, ascending.
+        merges: All of them.
+        owners: Name of the object of each raw trial.
+    """
+
+    graphs: dict[str, AspectTransitionGraph] = field(default_factory=dict)
+    ids: dict[str, int] = field(default_factory=dict)
+    positions: dict[str, int] = field(default_factory=dict)
+    merges: tuple[Merge, ...] = ()
+    owners: tuple[str, ...] = ()
+
+
+def held_by(connection: sqlite3.Connection, memory: RobotMemory) -> Held:
+    """Return what a database holds from which this memory has just been read."""
+    rows = connection.execute("SELECT name, id, position FROM graphs ORDER BY position").fetchall()
+    return Held(
+        {graph.name: graph for graph in memory},
+        {name: number for name, number, _ in rows},
+        {name: position for name, _, position in rows},
+        memory.merges,
+        _owners(memory),
+    )
+
+
+def replace_memory(connection: sqlite3.Connection, memory: RobotMemory) -> Held:
+    """Write a whole memory in place of what is there; records of trials stay. Inside of a transaction."""
+    changed = _assumptions_differ(connection, memory)
+    tables = ("raw_trials", "structure", "merges", "transitions", "aspects", "graphs", "actions", "slots")
+    for table in (*tables, "assumptions"):
+        connection.execute(f"DELETE FROM {table}")
+    assumptions = memory.assumptions
+    if changed:
+        connection.execute("UPDATE trials SET learned = NULL")
+    numbers = (assumptions.n_objects, assumptions.n_aspects, assumptions.alphabet.n_symbols)
+    connection.execute("INSERT INTO assumptions VALUES (1, ?, ?, ?)", numbers)
+    connection.executemany("INSERT INTO actions VALUES (?, ?)", enumerate(assumptions.actions))
+    connection.executemany("INSERT INTO slots VALUES (?, ?)", enumerate(assumptions.alphabet.slots))
+    held = write_changes(connection, memory, Held())
+    # No ATG of this memory has learned from what went to one that is not in it.
+    names = _compact([*memory.names, *(merge.dropped.name for merge in memory.merges)])
+    connection.execute(
+        "UPDATE trials SET learned = NULL WHERE learned NOT IN (SELECT value FROM json_each(?))", (names,)
+    )
+    return held
+
+
+def _assumptions_differ(connection: sqlite3.Connection, memory: RobotMemory) -> bool:
+    """Return whether the database holds a memory under other assumptions."""
+    alphabet = memory.assumptions.alphabet
+    row = connection.execute("SELECT n_aspects, n_symbols FROM assumptions").fetchone()
+    actions, slots = (
+        tuple(name for (name,) in connection.execute(f"SELECT name FROM {table} ORDER BY number"))
+        for table in ("actions", "slots")
+    )
+    new = ((memory.assumptions.n_aspects, alphabet.n_symbols), memory.assumptions.actions, alphabet.slots)
+    return row is not None and (row, actions, slots) != new
+
+
+def write_changes(connection: sqlite3.Connection, memory: RobotMemory, held: Held) -> Held:
+    """Write what a memory has and a database has not; return what the database then holds. Inside of a transaction."""
+    graphs = {graph.name: graph for graph in memory}
+    for name in held.graphs:
+        if name not in graphs:
+            _clear_graph(connection, held.ids[name])
+            connection.execute("DELETE FROM graphs WHERE id = ?", (held.ids[name],))
+    ids, positions = _placed(connection, list(graphs), held)
+    for name, graph in graphs.items():
+        if held.graphs.get(name) is not graph:
+            _clear_graph(connection, ids[name])
+            _insert_graph(connection, ids[name], graph)
+    merges = _write_merges(connection, memory.merges, held.merges)
+    owners = _owners(memory)
+    if isinstance(memory, StructuredMemory):
+        _write_structure(connection, memory, owners, held.owners, ids)
+    return Held(graphs, ids, positions, merges, owners)
+
+
+def _placed(connection: sqlite3.Connection, names: Sequence[str], held: Held) -> tuple[dict[str, int], dict[str, int]]:
+    """Give new ATGs a row, and all of them positions in the order of ``names``; return their ids and positions."""
+    known = set(names)
+    kept = [name for name in held.graphs if name in known]
+    positions = {name: held.positions[name] for name in kept}
+    last = max(positions.values(), default=-1)
+    if list(names[: len(kept)]) != kept:
+        positions = {}  # one comes between others, when a merge is undone: all move behind the last
+    ids = {}
+    for name in names:
+        if name not in positions:
+            positions[name] = last = last + 1
+        if name in held.ids:
+            ids[name] = held.ids[name]
+            if positions[name] != held.positions[name]:
+                connection.execute("UPDATE graphs SET position = ? WHERE id = ?", (positions[name], ids[name]))
+        else:
+            row = connection.execute("INSERT INTO graphs (position, name) VALUES (?, ?)", (positions[name], name))
+            ids[name] = int(row.lastrowid or 0)
+    return ids, {name: positions[name] for name in names}
+
+
+def _clear_graph(connection: sqlite3.Connection, number: int) -> None:
+    connection.execute("DELETE FROM transitions WHERE graph = ?", (number,))
+    connection.execute("DELETE FROM aspects WHERE graph = ?", (number,))
+
+
+def _insert_graph(connection: sqlite3.Connection, number: int, graph: AspectTransitionGraph) -> None:
+    aspects = ((number, index, _compact(list(pattern))) for index, pattern in enumerate(graph.aspects))
+    connection.executemany("INSERT INTO aspects VALUES (?, ?, ?)", aspects)
+    transitions = ((number, *edge, count) for edge, count in graph.counts.items())
+    connection.executemany("INSERT INTO transitions VALUES (?, ?, ?, ?, ?)", transitions)
+
+
+def _write_merges(
+    connection: sqlite3.Connection, merges: tuple[Merge, ...], held: tuple[Merge, ...]
+) -> tuple[Merge, ...]:
+    same = 0
+    while same < min(len(merges), len(held)) and merges[same] is held[same]:
+        same += 1
+    connection.execute("DELETE FROM merges WHERE number >= ?", (same,))
+    rows = ((same + index, _compact(write_merge(merge))) for index, merge in enumerate(merges[same:]))
+    connection.executemany("INSERT INTO merges VALUES (?, ?)", rows)
+    return merges
+
+
+def _write_structure(
+    connection: sqlite3.Connection,
+    memory: StructuredMemory,
+    owners: tuple[str, ...],
+    held: tuple[str, ...],
+    ids: dict[str, int],
+) -> None:
+    """Write the structures in question anew, raw trials that are new, and the owner of those that changed hands."""
+    section = write_learner(memory.learner, len(held))
+    new = section.pop("trials")
+    connection.execute("INSERT OR REPLACE INTO structure VALUES (1, ?)", (_compact(section),))
+    changed = ((ids[owner], number) for number, owner in enumerate(owners[: len(held)]) if owner != held[number])
+    connection.executemany("UPDATE raw_trials SET graph = ? WHERE number = ?", changed)
+    rows: Iterable[Any] = (
+        (len(held) + index, ids[trial["object"]], _compact(trial["observed"]), _compact(trial["actions"]))
+        for index, trial in enumerate(new)
+    )
+    connection.executemany("INSERT INTO raw_trials VALUES (?, ?, ?, ?)", rows)
+
+
+def _owners(memory: RobotMemory) -> tuple[str, ...]:
+    return tuple(memory.learner.owners) if isinstance(memory, StructuredMemory) else ()
+
+
+def _compact(value: Any) -> str:
+    return json.dumps(value, separators=(",", ":"))

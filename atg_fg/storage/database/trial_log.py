@@ -1,0 +1,145 @@
+"""The trials of one test as an experiment in a database: what ``TrialLog`` is in a file of its own."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, Final
+
+from atg_fg.core.assumptions import Assumptions
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.records import Experiment, StoredTrial, TrialOutcome, TrialRecord
+from atg_fg.storage.checked_json import plain_json
+from atg_fg.storage.database import trial_rows
+from atg_fg.storage.database.connection import open_to_read, open_to_write, translated, written
+from atg_fg.storage.database.keeper import software_version
+from atg_fg.storage.trial_log import outcome_of
+
+#: The kind of experiment that a test of the paper is.
+TEST_KIND: Final = "test"
+
+
+#: Seconds that a process waits for others that write trials to the same database.
+_WAIT: Final = 60.0
+
+
+class DatabaseTrialLog:
+    """The trials of one test in a database, which may hold other tests, and a memory.
+
+    Args:
+        path: The database; made if it is not there.
+        header: What test this is: its seed, and what its plan has other than usual.
+        assumptions: Of the memory; names the actions.
+    """
+
+    def __init__(self, path: Path, header: Mapping[str, Any], assumptions: Assumptions) -> None:
+        self.path = path
+        self._assumptions = assumptions
+        self._experiment = _experiment_of(header)
+
+    def begin(self) -> list[TrialOutcome]:
+        """Write the experiment, and return its trials: none.
+
+        Raises:
+            InvalidInputError: It is already there, or cannot be written.
+        """
+        if self._open():
+            raise _already_there(self.path)
+        return []
+
+    def resume(self) -> list[TrialOutcome]:
+        """Return the trials of this test that are in the database; begin it if it is not there.
+
+        Raises:
+            InvalidInputError: The database cannot be read or written.
+        """
+        self._open()
+        place = str(self.path)
+        trials = read_stored_trials(self.path, self._experiment.number)
+        return [outcome_of(trial.line(), self._assumptions, place) for trial in trials]
+
+    def append(self, record: TrialRecord, outcome: TrialOutcome | None = None) -> None:
+        """Write a trial, and what is learned from it if that is not what was seen, as one transaction."""
+        seen = tuple(record.patterns)
+        patterns = None if outcome is None or outcome.patterns == seen else outcome.patterns
+        with translated(self.path):
+            connection = open_to_write(self.path, wait=_WAIT)
+            try:
+                with written(connection):
+                    trial_rows.added(connection, self._experiment, StoredTrial.of(record, None, patterns))
+            finally:
+                connection.close()
+
+    def _open(self) -> bool:
+        """Find the experiment, or write it; return whether it was there."""
+        with translated(self.path):
+            connection = open_to_write(self.path, create=True, wait=_WAIT)
+            try:
+                with written(connection):
+                    number = trial_rows.find_experiment(connection, self._experiment)
+                    there = number is not None
+                    if number is None:
+                        number = trial_rows.add_experiment(connection, self._experiment)
+            finally:
+                connection.close()
+        self._experiment = Experiment(
+            TEST_KIND, self._experiment.parameters, self._experiment.seed, self._experiment.version, number
+        )
+        return there
+
+
+def check_not_in_database(path: Path, header: Mapping[str, Any]) -> None:
+    """Raise ``InvalidInputError`` if a database has a test already; one that is not there yet has none.
+
+    Args:
+        path: The database.
+        header: As for ``DatabaseTrialLog``.
+    """
+    if not path.exists() or not path.stat().st_size:
+        return
+    with translated(path):
+        connection = open_to_read(path)
+        try:
+            there = trial_rows.find_experiment(connection, _experiment_of(header)) is not None
+        finally:
+            connection.close()
+    if there:
+        raise _already_there(path)
+
+
+def _experiment_of(header: Mapping[str, Any]) -> Experiment:
+    parameters = json.loads(json.dumps(header, default=plain_json))
+    return Experiment(TEST_KIND, parameters, parameters.pop("seed"), software_version())
+
+
+def _already_there(path: Path) -> InvalidInputError:
+    return InvalidInputError(f"{path}: has this test already; expected another database, or --resume to go on")
+
+
+def read_stored_trials(path: Path | str, experiment: int | None = None) -> Iterator[StoredTrial]:
+    """Yield the trials in a database, all or those of one experiment.
+
+    Raises:
+        InvalidInputError: The file cannot be read, or a trial in it is not as it should be.
+    """
+    with translated(path):
+        connection = open_to_read(path)
+        try:
+            yield from trial_rows.read_trials(connection, str(path), experiment)
+        finally:
+            connection.close()
+
+
+def read_stored_experiments(path: Path | str) -> list[Experiment]:
+    """Return the experiments in a database.
+
+    Raises:
+        InvalidInputError: The file cannot be read, or an experiment in it is not as it should be.
+    """
+    with translated(path):
+        connection = open_to_read(path)
+        try:
+            return list(trial_rows.read_experiments(connection, str(path)))
+        finally:
+            connection.close()

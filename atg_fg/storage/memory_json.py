@@ -1,0 +1,164 @@
+"""A robot memory as one JSON document: what memory files hold, and what a database is checked as."""
+
+from __future__ import annotations
+
+import json
+from typing import Any, Final
+
+from atg_fg.core.aspect_graph import AspectTransitionGraph
+from atg_fg.core.assumptions import Assumptions
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.merging import Merge
+from atg_fg.core.patterns import PatternAlphabet
+from atg_fg.learning.structured_memory import StructuredMemory
+from atg_fg.storage.checked_json import (
+    check_format,
+    parse_json,
+    placed,
+    read_integer,
+    read_list,
+    read_object,
+    read_text,
+)
+from atg_fg.storage.structure_json import read_learner, write_learner
+
+MEMORY_FORMAT: Final = "atg-fg/memory"
+
+
+def memory_to_json(memory: RobotMemory) -> str:
+    """Return a robot memory as the text of a JSON document."""
+    return json.dumps(memory_to_document(memory), indent=1) + "\n"
+
+
+def memory_from_json(text: str, place: str = "memory") -> RobotMemory:
+    """Return the robot memory in the text of a JSON document; errors name ``place``."""
+    return memory_from_document(parse_json(text, place), place)
+
+
+def memory_to_document(memory: RobotMemory) -> dict[str, Any]:
+    """Return a robot memory as JSON knows it."""
+    document: dict[str, Any] = {
+        "format": MEMORY_FORMAT,
+        "version": 1,
+        "assumptions": write_assumptions(memory.assumptions),
+        "memory": [write_graph(graph) for graph in memory],
+    }
+    if memory.merges:
+        document["merges"] = [write_merge(merge) for merge in memory.merges]
+    if isinstance(memory, StructuredMemory):
+        document["structure"] = write_learner(memory.learner)
+    return document
+
+
+def memory_from_document(value: Any, place: str = "memory") -> RobotMemory:
+    """Return the robot memory in a document; errors name ``place``.
+
+    Raises:
+        InvalidInputError: Anything in it is not as it should be.
+    """
+    keys = ("format", "version", "assumptions", "memory")
+    document = read_object(value, place, keys, optional=("merges", "structure"))
+    check_format(document, MEMORY_FORMAT, place)
+    assumptions = read_assumptions(document["assumptions"], f"{place}: assumptions")
+    memory = read_memory(document["memory"], assumptions, f"{place}: memory")
+    entries = read_list(document.get("merges", []), f"{place}: merges")
+    merges = [_read_merge(entry, assumptions, f"{place}: merges[{index}]") for index, entry in enumerate(entries)]
+    learner = None
+    if "structure" in document:
+        learner = read_learner(document["structure"], assumptions, memory.names, f"{place}: structure")
+    with placed(place):
+        if learner is None:
+            return RobotMemory(assumptions, memory, merges)
+        return StructuredMemory(assumptions, memory, learner, merges)
+
+
+def write_merge(merge: Merge) -> dict[str, Any]:
+    """Return a merge as JSON knows it."""
+    return {
+        "kept": write_graph(merge.kept),
+        "dropped": write_graph(merge.dropped),
+        "position": merge.position,
+        "trials": list(merge.trials),
+    }
+
+
+def _read_merge(value: Any, assumptions: Assumptions, place: str) -> Merge:
+    """Return the merge at ``place``."""
+    fields = read_object(value, place, ("kept", "dropped", "position", "trials"))
+    trials = read_list(fields["trials"], f"{place}.trials")
+    return Merge(
+        read_graph(fields["kept"], assumptions, f"{place}.kept"),
+        read_graph(fields["dropped"], assumptions, f"{place}.dropped"),
+        read_integer(fields["position"], f"{place}.position", least=0),
+        tuple(read_integer(number, f"{place}.trials[{index}]", least=0) for index, number in enumerate(trials)),
+    )
+
+
+def read_assumptions(value: Any, place: str) -> Assumptions:
+    """Return the assumptions at ``place``."""
+    fields = read_object(value, place, ("n_objects", "n_aspects", "actions", "slots", "n_symbols"))
+    texts = {
+        key: tuple(
+            read_text(name, f"{place}.{key}[{index}]")
+            for index, name in enumerate(read_list(fields[key], f"{place}.{key}"))
+        )
+        for key in ("actions", "slots")
+    }
+    numbers = {
+        key: read_integer(fields[key], f"{place}.{key}", least=1) for key in ("n_objects", "n_aspects", "n_symbols")
+    }
+    with placed(place):
+        alphabet = PatternAlphabet(texts["slots"], numbers["n_symbols"])
+        return Assumptions(numbers["n_objects"], numbers["n_aspects"], texts["actions"], alphabet)
+
+
+def write_assumptions(assumptions: Assumptions) -> dict[str, Any]:
+    """Return assumptions as JSON knows them."""
+    return {
+        "n_objects": assumptions.n_objects,
+        "n_aspects": assumptions.n_aspects,
+        "actions": list(assumptions.actions),
+        "slots": list(assumptions.alphabet.slots),
+        "n_symbols": assumptions.alphabet.n_symbols,
+    }
+
+
+def read_memory(value: Any, assumptions: Assumptions, place: str) -> RobotMemory:
+    """Return the robot memory whose list of ATGs is at ``place``."""
+    memory = RobotMemory(assumptions)
+    for index, entry in enumerate(read_list(value, place)):
+        graph = read_graph(entry, assumptions, f"{place}[{index}]")
+        with placed(f"{place}[{index}]"):
+            memory.add(graph)
+    return memory
+
+
+def read_graph(value: Any, assumptions: Assumptions, place: str) -> AspectTransitionGraph:
+    """Return the ATG at ``place``."""
+    fields = read_object(value, place, ("name", "aspects", "transitions"))
+    graph = AspectTransitionGraph(read_text(fields["name"], f"{place}.name"), assumptions)
+    for index, pattern in enumerate(read_list(fields["aspects"], f"{place}.aspects")):
+        where = f"{place}.aspects[{index}]"
+        with placed(where):
+            graph.add_aspect(assumptions.alphabet.check_pattern(read_list(pattern, where)))
+    for index, entry in enumerate(read_list(fields["transitions"], f"{place}.transitions")):
+        where = f"{place}.transitions[{index}]"
+        edge = read_object(entry, where, ("from", "action", "to", "count"))
+        action = assumptions.action_index(edge["action"], f"{where}.action")
+        ends = [read_integer(edge[key], f"{where}.{key}", least=0) for key in ("from", "to")]
+        count = read_integer(edge["count"], f"{where}.count", least=1)
+        with placed(where):
+            graph.add_transition(ends[0], action, ends[1], count)
+    return graph
+
+
+def write_graph(graph: AspectTransitionGraph) -> dict[str, Any]:
+    """Return an ATG as JSON knows it."""
+    return {
+        "name": graph.name,
+        "aspects": [list(pattern) for pattern in graph.aspects],
+        "transitions": [
+            {"from": source, "action": graph.assumptions.actions[action], "to": target, "count": count}
+            for (source, action, target), count in sorted(graph.counts.items())
+        ],
+    }

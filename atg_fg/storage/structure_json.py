@@ -1,0 +1,132 @@
+"""What a learner has learned as a section of a memory file, checked on the way in.
+
+Raw trials, the structures in question and the rates in force are kept; scores and contents follow from them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Final
+
+from atg_fg.core.assumptions import Assumptions
+from atg_fg.core.errors import InvalidInputError, TooLargeError
+from atg_fg.learning.learner import MAX_CANDIDATES, StructureLearner
+from atg_fg.learning.rates import PRIORS, Rates
+from atg_fg.learning.raw_trials import RawTrial
+from atg_fg.learning.shared_structure import SharedStructure
+from atg_fg.storage.checked_json import read_integer, read_list, read_object
+
+
+def write_learner(learner: StructureLearner, first: int = 0) -> dict[str, Any]:
+    """Return a learner as JSON knows it, with its raw trials from number ``first`` on."""
+    names = learner.assumptions.actions
+    return {
+        "seed": learner.seed,
+        "evaluations": learner.n_evaluations,
+        "rates": {name: getattr(learner.rates, name) for name in PRIORS},
+        "candidates": [write_structure(structure, learner.assumptions) for structure in learner.candidates],
+        "trials": [
+            {
+                "object": owner,
+                "observed": [list(detection) for detection in trial.detections],
+                "actions": [names[action] for action in trial.actions],
+            }
+            for owner, trial in zip(learner.owners[first:], learner.trials[first:], strict=True)
+        ],
+    }
+
+
+def read_learner(value: Any, assumptions: Assumptions, names: Sequence[str], place: str) -> StructureLearner:
+    """Return the learner at ``place``.
+
+    Args:
+        value: What the file has there.
+        assumptions: Of the memory.
+        names: Of the ATGs in the memory, which the trials are of.
+        place: Where it is, for error messages.
+
+    Raises:
+        InvalidInputError: Anything malformed; the message names the place.
+    """
+    fields = read_object(value, place, ("seed", "rates", "candidates", "trials"), optional=("evaluations",))
+    learner = StructureLearner(assumptions, read_integer(fields["seed"], f"{place}.seed", least=0))
+    learner.n_evaluations = read_integer(fields.get("evaluations", 0), f"{place}.evaluations", least=0)
+    candidates = read_list(fields["candidates"], f"{place}.candidates")
+    if len(candidates) > MAX_CANDIDATES:
+        raise InvalidInputError(f"{place}.candidates: {len(candidates)} structures; expected at most {MAX_CANDIDATES}")
+    structures = [
+        read_structure(candidate, assumptions, f"{place}.candidates[{index}]")
+        for index, candidate in enumerate(candidates)
+    ]
+    rates = _read_rates(fields["rates"], f"{place}.rates")
+    entries = read_list(fields["trials"], f"{place}.trials")
+    trials = [_read_trial(entry, assumptions, names, f"{place}.trials[{index}]") for index, entry in enumerate(entries)]
+    learner.restore([owner for owner, _ in trials], [trial for _, trial in trials], structures, rates)
+    return learner
+
+
+def _read_trial(value: Any, assumptions: Assumptions, names: Sequence[str], place: str) -> tuple[str, RawTrial]:
+    """Return the name of a trial's object, and the trial."""
+    fields = read_object(value, place, ("object", "observed", "actions"))
+    owner = fields["object"]
+    if not isinstance(owner, str) or owner not in names:
+        raise InvalidInputError(f"{place}.object: {owner!r}; expected the name of an ATG in this memory")
+    looks = read_list(fields["observed"], f"{place}.observed")
+    detections = tuple(
+        assumptions.alphabet.check_detection(read_list(look, where), where)
+        for look, where in ((look, f"{place}.observed[{index}]") for index, look in enumerate(looks))
+    )
+    actions = tuple(
+        assumptions.action_index(name, f"{place}.actions[{index}]")
+        for index, name in enumerate(read_list(fields["actions"], f"{place}.actions"))
+    )
+    trial = RawTrial(detections, actions)
+    trial.check(assumptions, place)
+    return owner, trial
+
+
+#: Hidden registers that a file may name; far above what can be learned.
+MAX_REGISTERS: Final = 64
+
+
+def write_structure(structure: SharedStructure, assumptions: Assumptions) -> dict[str, Any]:
+    """Return a structure as JSON knows it."""
+    sources = {name: list(each) for name, each in zip(assumptions.actions, structure.sources, strict=True)}
+    return {"registers": structure.n_registers, "sources": sources}
+
+
+def read_structure(value: Any, assumptions: Assumptions, place: str) -> SharedStructure:
+    """Return the structure at ``place``, in canonical form.
+
+    Raises:
+        InvalidInputError: It is none for these slots and actions; the message names the place.
+    """
+    fields = read_object(value, place, ("registers", "sources"))
+    n_registers = read_integer(fields["registers"], f"{place}.registers", least=len(assumptions.alphabet.slots))
+    if n_registers > MAX_REGISTERS:
+        raise InvalidInputError(f"{place}.registers: {n_registers}; expected at most {MAX_REGISTERS}")
+    by_action = read_object(fields["sources"], f"{place}.sources", assumptions.actions)
+    sources = [_read_sources(by_action[name], n_registers, f"{place}.sources.{name}") for name in assumptions.actions]
+    structure = SharedStructure(len(assumptions.alphabet.slots), tuple(sources)).canonical()
+    try:
+        structure.poses()
+    except TooLargeError as error:
+        raise InvalidInputError(f"{place}: {error}") from error
+    return structure
+
+
+def _read_sources(value: Any, n_registers: int, place: str) -> tuple[int, ...]:
+    entries: Sequence[Any] = read_list(value, place)
+    sources = tuple(read_integer(entry, f"{place}[{index}]", least=0) for index, entry in enumerate(entries))
+    if len(sources) != n_registers or max(sources) >= n_registers:
+        raise InvalidInputError(f"{place}: {list(sources)}; expected {n_registers} numbers of 0 to {n_registers - 1}")
+    return sources
+
+
+def _read_rates(value: Any, place: str) -> Rates:
+    """Return the rates at ``place``, or raise ``InvalidInputError`` naming it."""
+    fields = read_object(value, place, tuple(PRIORS))
+    try:
+        return Rates(**fields)
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{place}: {error}") from error

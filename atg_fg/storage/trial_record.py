@@ -1,0 +1,53 @@
+"""A trial as JSON lines: a header, a line a look, the verdict."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from typing import Any, Final
+
+from atg_fg.core.records import TrialRecord
+from atg_fg.storage.checked_json import plain_json
+from atg_fg.storage.memory_json import write_assumptions
+
+#: What the first line of a record says that it is.
+TRIAL_FORMAT: Final = "atg-fg/trial"
+
+
+def to_json_lines(record: TrialRecord, frames: Sequence[str] = (), **header: Any) -> str:
+    """Return the record as JSON lines: a header, a line a step, the verdict.
+
+    Args:
+        record: The trial.
+        frames: Path of the camera picture of each look, from the record's folder, if there are any.
+        header: What else the header says.
+    """
+    assumptions = write_assumptions(record.assumptions)
+    lines: list[dict[str, Any]] = [
+        {"format": TRIAL_FORMAT, "version": 1, "objects": record.names, "assumptions": assumptions, **header}
+    ]
+    lines += [_step_line(record, time) for time in range(len(record.steps))]
+    for line, frame in zip(lines[1:], frames, strict=False):
+        line["frame"] = frame
+    verdict = {"outcome": record.verdict, "judged_novel": record.judged_novel, "matched": record.matched}
+    lines.append({"verdict": {**verdict, "truth": record.lost_truth or record.steps[-1].truth}})
+    return "".join(json.dumps(line, default=plain_json, allow_nan=False) + "\n" for line in lines)
+
+
+def _step_line(record: TrialRecord, time: int) -> dict[str, Any]:
+    step, actions = record.steps[time], record.assumptions.actions
+    bound = step.total_variation_bound
+    expected = step.expected_entropies
+    return {
+        "step": time,
+        "observed": step.detection,
+        "objects": step.belief.objects,
+        "unseen": step.belief.unseen,
+        "entropy": step.belief.entropy,
+        "log_evidence": step.log_evidence,
+        "expected_entropy": None if expected is None else dict(zip(actions, expected.tolist(), strict=True)),
+        "action": None if step.action is None else actions[step.action],
+        **({} if step.purpose is None else {"purpose": step.purpose}),
+        **({} if bound is None else {"total_variation_bound": bound}),
+        "truth": step.truth,
+    }

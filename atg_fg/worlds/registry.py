@@ -1,0 +1,85 @@
+"""Worlds by name.
+
+A world has a ``Discrete`` action space and a ``MultiDiscrete`` observation space with one entry a slot:
+the symbol detected there, or ``MISSING``. ``info`` carries the truth, for scoring only.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Final
+
+import gymnasium
+
+from atg_fg.core.assumptions import Assumptions, arcube_assumptions
+from atg_fg.core.errors import InvalidInputError, unknown_name
+from atg_fg.worlds.arcube import make_arcubes
+from atg_fg.worlds.base import World
+
+#: Names on the command line. The part before the colon is imported first, so that it can register the id.
+WORLDS: Final[dict[str, str]] = {
+    "ideal": "atg_fg.worlds:atg_fg/ARcube-v0",
+    "rendered": "sim:sim/RenderedARcube-v0",
+    "robonaut": "sim:sim/RobonautARcube-v0",
+    "prism": "atg_fg.worlds:atg_fg/HexagonalPrism-v0",
+    "lock": "atg_fg.worlds:atg_fg/RingLock-v0",
+    "lid-box": "atg_fg.worlds:atg_fg/LidBox-v0",
+    "random-atg": "atg_fg.worlds:atg_fg/RandomATG-v0",
+    "half-and-half": "atg_fg.worlds:atg_fg/HalfAndHalf-v0",
+    "repeated-tags": "atg_fg.worlds:atg_fg/RepeatedTags-v0",
+}
+
+
+#: Those of them whose objects are ARcubes, given as ``cubes``. The others draw objects of their own.
+ARCUBE_WORLDS: Final = ("ideal", "rendered", "robonaut")
+
+
+def make_world(name: str, **options: Any) -> World:
+    """Return the world registered as ``name`` (or any ``module:namespace/Id-v0`` of a user's own).
+
+    Raises:
+        UnknownNameError: No world has this name.
+        MissingDependencyError: The world needs an extra that is not installed.
+    """
+    if name not in WORLDS and ":" not in name:
+        raise unknown_name("world", name, WORLDS)
+    try:
+        return gymnasium.make(WORLDS.get(name, name), disable_env_checker=True, **options)
+    except (gymnasium.error.Error, ModuleNotFoundError, TypeError) as error:
+        if isinstance(error, TypeError) and "unexpected keyword argument" not in str(error):
+            raise  # a fault of the world's own
+        raise InvalidInputError(f"world {name!r}: cannot be made: {error}") from error
+
+
+def make_world_with(name: str, n_objects: int, seed: int, **options: Any) -> World:
+    """Return the world registered as ``name`` with ``n_objects`` objects drawn by ``seed``; a user's own has its own.
+
+    Raises:
+        InvalidInputError: As for ``make_world``.
+    """
+    if name in ARCUBE_WORLDS:
+        return make_world(name, cubes=make_arcubes(n_objects, seed), **options)
+    if name in WORLDS:
+        return make_world(name, n_objects=n_objects, objects_seed=seed, **options)
+    return make_world(name, **options)
+
+
+def assumptions_of(world: World, n_objects: int) -> Assumptions:
+    """Return what the robot shall take for granted in a world: what its attribute ``assumptions`` says, if it has one.
+
+    A world without one is of ``n_objects`` ARcubes.
+
+    Raises:
+        InvalidInputError: The attribute is something else.
+    """
+    if not world.has_wrapper_attr("assumptions"):
+        return arcube_assumptions(n_objects)
+    found = world.get_wrapper_attr("assumptions")
+    if not isinstance(found, Assumptions):
+        raise InvalidInputError(f"world's assumptions: {found!r}; expected an atg_fg.Assumptions")
+    return found
+
+
+def check_arcube_world(role: str, name: str) -> None:
+    """Raise ``InvalidInputError`` naming ``role`` if the world of this name is known to be without ARcubes."""
+    if name in WORLDS and name not in ARCUBE_WORLDS:
+        raise InvalidInputError(f"{role}: {name!r}; expected a world of ARcubes: {', '.join(ARCUBE_WORLDS)}")

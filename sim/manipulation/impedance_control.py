@@ -1,0 +1,155 @@
+"""Impedance control of both arms: springs and dampers at the joints, gravity and grip fed forward, limits kept."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Final
+
+import numpy as np
+
+from atg_fg.core.patterns import FloatArray
+from sim.bodies.robot import RobotBody
+
+TIME_STEP: Final = 1 / 240  # s; a longer step makes such stiff springs unstable
+
+
+_STIFFNESS: Final = np.array([900.0, 900.0, 500.0, 600.0, 200.0, 120.0, 120.0])  # N·m/rad
+
+
+_DAMPING: Final = np.array([60.0, 60.0, 16.0, 20.0, 3.0, 2.0, 1.5])  # N·m·s/rad
+
+
+#: The share of a joint's speed that motions are planned with, on the mean: a curve from rest to rest peaks at 1.5.
+_SPEED_SHARE: Final = 0.55
+
+
+#: No more than this share is ever asked for; the rest is for the arms to catch up.
+_PEAK_SHARE: Final = 0.90
+
+
+_STEPS_PER_REFERENCE: Final = 4
+
+
+@dataclass(frozen=True, eq=False)
+class JointTarget:
+    """A point of a motion in joint space.
+
+    Attributes:
+        angles: Shape [2, 7], rad.
+        feedforward: Torques against gravity and for the grip, shape [2, 7], N·m.
+        seconds: Time to get there; longer if a joint's speed asks for it.
+        still: Time to wait there, s.
+    """
+
+    angles: FloatArray
+    feedforward: FloatArray
+    seconds: float
+    still: float = 0.0
+
+
+@dataclass
+class Exertion:
+    """How near the joints came to their limits.
+
+    Attributes:
+        velocity: Greatest speed of each joint as a share of its limit, shape [2, 7].
+        effort: Greatest torque of each joint as a share of its limit, shape [2, 7].
+        saturated_steps: Steps in which some joint's torque was cut at its limit.
+        steps: Steps of the simulation.
+    """
+
+    velocity: FloatArray = field(default_factory=lambda: np.zeros((2, 7)))
+    effort: FloatArray = field(default_factory=lambda: np.zeros((2, 7)))
+    saturated_steps: int = 0
+    steps: int = 0
+
+
+class ArmController:
+    """Drives the arms from target to target.
+
+    Args:
+        robot: The robot.
+        advance: Takes the simulation one step on.
+    """
+
+    def __init__(self, robot: RobotBody, advance: Callable[[], None]) -> None:
+        self.robot = robot
+        self._advance = advance
+        self.exertion = Exertion()
+        self.reference, _ = robot.state()
+        self.feedforward = robot.gravity_torques(self.reference)
+
+    def run(self, targets: Sequence[JointTarget]) -> None:
+        """Go through ``targets`` in order, smoothly, and come to rest where one asks to wait, and at the end."""
+        first = 0
+        for last, target in enumerate(targets):
+            if target.still or last == len(targets) - 1:
+                self._sweep(targets[first : last + 1])
+                self.hold(target.still)
+                first = last + 1
+
+    def hold(self, seconds: float) -> None:
+        """Stay where the arms are commanded to be."""
+        still = np.zeros_like(self.reference)
+        for _ in range(round(seconds / TIME_STEP)):
+            self._step(self.reference, still, self.feedforward)
+
+    def _sweep(self, targets: Sequence[JointTarget]) -> None:
+        """Go through ``targets`` along cubic curves, from rest to rest."""
+        angles = np.array([self.reference, *(target.angles for target in targets)])
+        loads = np.array([self.feedforward, *(target.feedforward for target in targets)])
+        seconds, slopes = self._timed(angles, np.array([target.seconds for target in targets]))
+        for leg, time in enumerate(seconds):
+            self._curve(angles[leg : leg + 2], slopes[leg], loads[leg : leg + 2], float(time))
+        self.reference, self.feedforward = angles[-1], loads[-1]
+
+    def _timed(self, angles: FloatArray, least: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return how long each leg takes, s, and its slopes at both ends, shape [legs, 2, 2, 7], rad a leg.
+
+        No leg is quicker than ``least``, and none of its joints quicker than planned for.
+        """
+        ways = np.diff(angles, axis=0)
+        slowest = (np.abs(ways) / (_SPEED_SHARE * self.robot.velocity)).max(axis=(1, 2))
+        seconds = np.maximum(slowest, least)
+        duration = seconds[:, None, None]
+        # Between two legs the speed is their mean, weighted so that the curve does not swing.
+        speeds = np.zeros_like(angles)
+        speeds[1:-1] = (ways[1:] + ways[:-1]) / (duration[1:] + duration[:-1])
+        slopes = np.stack([speeds[:-1] * duration, speeds[1:] * duration], axis=1)
+        # Where legs differ much the curve may still be quicker between its ends; slower as a whole, it is not.
+        part = np.linspace(0.0, 1.0, 9)[:, None, None, None]
+        square, cube = _cubic(ways, slopes[:, 0], slopes[:, 1])
+        peak = np.abs((slopes[:, 0] + part * (2 * square + 3 * part * cube)) / duration).max(axis=(0, 1))
+        excess = float((peak / (_PEAK_SHARE * self.robot.velocity)).max())
+        return seconds * max(1.0, excess), slopes
+
+    def _curve(self, ends: FloatArray, slopes: FloatArray, loads: FloatArray, seconds: float) -> None:
+        """Follow one cubic: angles and slopes (rad a leg) at its two ends, each of shape [2, 2, 7]."""
+        steps = max(1, round(seconds / TIME_STEP))
+        way = ends[1] - ends[0]
+        square, cube = _cubic(way, slopes[0], slopes[1])
+        for step in range(steps):
+            if step % _STEPS_PER_REFERENCE == 0:
+                part = min(1.0, (step + _STEPS_PER_REFERENCE / 2) / steps)
+                reference = ends[0] + part * (slopes[0] + part * (square + part * cube))
+                speed = (slopes[0] + part * (2 * square + 3 * part * cube)) / seconds
+                feedforward = loads[0] + part * (loads[1] - loads[0])
+            self._step(reference, speed, feedforward)
+
+    def _step(self, reference: FloatArray, speed: FloatArray, feedforward: FloatArray) -> None:
+        angles, velocities = self.robot.state()
+        wanted = _STIFFNESS * (reference - angles) + _DAMPING * (speed - velocities) + feedforward
+        torques = np.clip(wanted, -self.robot.effort, self.robot.effort)
+        self.robot.apply(torques)
+        self._advance()
+        exertion = self.exertion
+        exertion.steps += 1
+        np.maximum(exertion.velocity, np.abs(velocities) / self.robot.velocity, out=exertion.velocity)
+        np.maximum(exertion.effort, np.abs(torques) / self.robot.effort, out=exertion.effort)
+        exertion.saturated_steps += bool((torques != wanted).any())
+
+
+def _cubic(way: FloatArray, first: FloatArray, last: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the coefficients of t² and t³ of the curve over ``way`` with slopes ``first`` and ``last`` at its ends."""
+    return 3 * way - 2 * first - last, first + last - 2 * way

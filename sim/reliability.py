@@ -1,0 +1,228 @@
+"""How well the robot turns the cube: many random actions, scored by the simulator's truth."""
+
+from __future__ import annotations
+
+import multiprocessing
+import time
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import closing, contextmanager
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.patterns import FloatArray
+from atg_fg.core.statistics import wilson_interval
+from atg_fg.worlds.arcube import ACTION_SOURCES
+from atg_fg.worlds.base import MISSING
+from sim.worlds.domain_randomization import condition_named
+from sim.worlds.robonaut_world import RobonautARcubeWorld
+from sim.worlds.stations_world import RobonautTableWorld
+
+#: Actions between two new cubes, as in a trial.
+ACTIONS_A_TRIAL: Final = 10
+
+
+_ACTIONS: Final = tuple(ACTION_SOURCES)
+
+
+@dataclass(frozen=True)
+class Look:
+    """What was detected of what could be seen: the symbols of (front, top)."""
+
+    detected: tuple[int, ...]
+    shown: tuple[int, ...]
+
+    @property
+    def n_detected(self) -> int:
+        """How many slots were detected."""
+        return sum(symbol != MISSING for symbol in self.detected)
+
+    @property
+    def n_wrong(self) -> int:
+        """How many slots were detected as another symbol."""
+        pairs = zip(self.detected, self.shown, strict=True)
+        return sum(symbol not in (MISSING, truth) for symbol, truth in pairs)
+
+
+@dataclass(frozen=True)
+class ScoredAction:
+    """One action and what came of it, by the simulator's truth (``info`` of ``RobonautARcubeWorld.step``)."""
+
+    name: str
+    info: dict[str, Any]
+
+
+@dataclass
+class Run:
+    """The actions and looks of one trial.
+
+    Attributes:
+        actions: The actions, in order.
+        looks: The looks at a cube that was not lost.
+        velocity: Greatest speed of each joint as a share of its limit, shape [2, 7].
+        effort: Greatest torque of each joint as a share of its limit, shape [2, 7].
+        saturated_steps: Steps in which a torque was cut at its limit.
+        self_contacts: Samples in which the robot touched itself.
+        steps: Steps of the simulation.
+        wall_seconds: How long it took; the only figure that is not the same each time.
+    """
+
+    velocity: FloatArray
+    effort: FloatArray
+    actions: list[ScoredAction] = field(default_factory=list)
+    looks: list[Look] = field(default_factory=list)
+    saturated_steps: int = 0
+    self_contacts: int = 0
+    steps: int = 0
+    wall_seconds: float = 0.0
+
+
+def run_actions(
+    condition: str,
+    n_actions: int,
+    seed: int = 0,
+    jobs: int = 1,
+    urdf: Path | None = None,
+    on_trial: Callable[[], None] | None = None,
+    n_stations: int = 1,
+) -> list[Run]:
+    """Let the robot do random actions, a new cube every ten, and return what came of them.
+
+    Where there are several cubes, the robot goes to a random one before each action.
+
+    Each trial has its own generator, spawned from ``SeedSequence(seed)``; the result is the same for any ``jobs``.
+
+    Args:
+        condition: Name of a condition.
+        n_actions: How many; a trial that loses the cube is short, and others take its place.
+        seed: Seed of all.
+        jobs: Processes.
+        urdf: A user's own description of the robot.
+        on_trial: Called after each trial.
+        n_stations: Cubes in the scene.
+    """
+    condition_named(condition)
+    for name, number in (("actions", n_actions), ("jobs", jobs), ("stations", n_stations)):
+        if number < 1:
+            raise InvalidInputError(f"{name}: {number}; expected a whole number of at least 1")
+    runs: list[Run] = []
+    left = n_actions
+    spawner = np.random.SeedSequence(seed)
+    with _mapping(jobs) as run_all:
+        while left > 0:
+            lengths = [ACTIONS_A_TRIAL] * (left // ACTIONS_A_TRIAL)
+            lengths += [left % ACTIONS_A_TRIAL] if left % ACTIONS_A_TRIAL else []
+            for run in run_all(partial(_run_trial, condition, urdf, n_stations), lengths, spawner.spawn(len(lengths))):
+                runs.append(run)
+                left -= len(run.actions)
+                if on_trial is not None:
+                    on_trial()
+    return runs
+
+
+@contextmanager
+def _mapping(jobs: int) -> Iterator[Callable[..., Iterator[Run]]]:
+    """Give what runs trials and returns their runs in order: here, or in a pool of spawned processes."""
+    if jobs == 1:
+        yield map
+        return
+    with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
+        yield pool.map
+
+
+def _run_trial(condition: str, urdf: Path | None, n_stations: int, n_actions: int, seed: np.random.SeedSequence) -> Run:
+    rng = np.random.default_rng(seed)
+    with closing(_world(condition, urdf, n_stations)) as world:
+        begun = time.perf_counter()
+        observation, info = world.reset(seed=int(rng.integers(2**31)))
+        run = Run(world.controller.exertion.velocity, world.controller.exertion.effort)
+        run.looks.append(Look(tuple(observation.tolist()), info["pattern"]))
+        for action in rng.integers(len(_ACTIONS), size=n_actions):
+            if n_stations > 1:
+                observation, _, _, _, info = world.step(len(_ACTIONS) + rng.integers(n_stations))
+                if info["lost"]:
+                    break
+                run.looks.append(Look(tuple(observation.tolist()), info["pattern"]))
+            observation, _, _, _, info = world.step(action)
+            run.actions.append(ScoredAction(_ACTIONS[action], info))
+            if info["lost"]:
+                break
+            run.looks.append(Look(tuple(observation.tolist()), info["pattern"]))
+        run.wall_seconds = time.perf_counter() - begun
+        exertion = world.controller.exertion
+        run.velocity, run.effort, run.saturated_steps = exertion.velocity, exertion.effort, exertion.saturated_steps
+        run.self_contacts, run.steps = world.scene.self_contacts, world.scene.steps
+    return run
+
+
+def _world(condition: str, urdf: Path | None, n_stations: int) -> RobonautARcubeWorld:
+    if n_stations == 1:
+        return RobonautARcubeWorld(condition=condition, urdf=urdf)
+    return RobonautTableWorld(n_stations=n_stations, condition=condition, urdf=urdf)
+
+
+def summarise(runs: Sequence[Run]) -> dict[str, Any]:
+    """Return rates with 95 % Wilson intervals, errors, forces, and times of a list of runs."""
+    actions = [action for run in runs for action in run.actions]
+    looks = [look for run in runs for look in run.looks]
+    right = [action for action in actions if action.info["right"]]
+    steps = sum(run.steps for run in runs)
+    return {
+        "success": _rate(len(right), len(actions)),
+        "by_action": {
+            name: _rate(
+                sum(action.info["right"] for action in actions if action.name == name),
+                sum(action.name == name for action in actions),
+            )
+            for name in _ACTIONS
+        },
+        "failures": {
+            "stayed": sum(action.info["slipped"] and not action.info["lost"] for action in actions),
+            "lost": sum(action.info["lost"] for action in actions),
+            "another_orientation": sum(_went_elsewhere(action) for action in actions),
+        },
+        "angle_error_degrees": _spread(action.info["angle_error"] for action in right),
+        "position_error_metres": _spread(action.info["position_error"] for action in right),
+        "peak_force_newtons": _spread(action.info["peak_force"] for action in actions),
+        "squarings_per_action": float(np.mean([action.info["squarings"] for action in actions])),
+        "simulated_seconds_per_action": _spread(action.info["simulated_seconds"] for action in actions),
+        "detection": {
+            "both": _rate(sum(look.n_detected == 2 for look in looks), len(looks)),
+            "one": _rate(sum(look.n_detected == 1 for look in looks), len(looks)),
+            "none": _rate(sum(look.n_detected == 0 for look in looks), len(looks)),
+            "wrong_ids": _rate(sum(look.n_wrong > 0 for look in looks), len(looks)),
+        },
+        "joints": {
+            "largest_share_of_velocity_limit": float(max(run.velocity.max() for run in runs)),
+            "largest_share_of_effort_limit": float(max(run.effort.max() for run in runs)),
+            "share_of_steps_at_effort_limit": sum(run.saturated_steps for run in runs) / steps,
+            "self_contacts": sum(run.self_contacts for run in runs),
+        },
+        "timing": {
+            "wall_seconds_per_action": sum(run.wall_seconds for run in runs) / len(actions),
+            "steps_per_wall_second": steps / sum(run.wall_seconds for run in runs),
+        },
+    }
+
+
+def _went_elsewhere(action: ScoredAction) -> bool:
+    info = action.info
+    return not info["lost"] and not info["slipped"] and info["orientation"] != info["expected_orientation"]
+
+
+def _rate(count: int, total: int) -> dict[str, Any]:
+    interval = list(wilson_interval(count, total)) if total else None
+    return {"count": count, "of": total, "rate": count / total if total else None, "interval95": interval}
+
+
+def _spread(values: Iterable[float]) -> dict[str, float | None]:
+    """Return mean, 95th percentile and maximum."""
+    sample = np.array(list(values))
+    if not sample.size:
+        return {"mean": None, "p95": None, "max": None}
+    return {"mean": float(sample.mean()), "p95": float(np.quantile(sample, 0.95)), "max": float(sample.max())}

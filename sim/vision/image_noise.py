@@ -1,0 +1,58 @@
+"""How a camera sees: light, blur, noise, and the tags detected in what is left."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from atg_fg.core.errors import InvalidInputError
+from sim.vision.camera import Camera, Light
+
+
+@dataclass(frozen=True)
+class Imaging:
+    """What stands between the scene and a camera frame.
+
+    Attributes:
+        light_jitter: How much the light may change at each look, 0 (not at all) to 1.
+        image_noise: Standard deviation of noise on each grey level (0 to 255).
+        blur: Standard deviation of a Gaussian blur, pixels.
+
+    Raises:
+        InvalidInputError: A value below zero or not finite.
+    """
+
+    light_jitter: float = 0.0
+    image_noise: float = 0.0
+    blur: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("light_jitter", "image_noise", "blur"):
+            at_least_zero(name, getattr(self, name))
+
+    def frame(self, camera: Camera, client: int, rng: np.random.Generator) -> NDArray[np.uint8]:
+        """Return what the camera sees, RGB, shape [height, width, 3]. Draws nothing for what is zero."""
+        frame = camera.render(client, self._light(rng))
+        if self.blur:
+            frame = np.asarray(cv2.GaussianBlur(frame, (0, 0), self.blur), dtype=np.uint8)
+        if self.image_noise:
+            noisy = frame + rng.normal(0.0, self.image_noise, (*frame.shape[:2], 1))
+            frame = np.clip(np.round(noisy), 0, 255).astype(np.uint8)
+        return frame
+
+    def _light(self, rng: np.random.Generator) -> Light:
+        if not self.light_jitter:
+            return Light()
+        change = self.light_jitter * rng.uniform(-1, 1, 3)
+        x, y, z = Light().direction
+        return Light((x + change[0], y + change[1], z), Light().ambient, Light().diffuse * (1 + 0.5 * change[2]))
+
+
+def at_least_zero(name: str, value: float) -> float:
+    """Return ``value`` if it is a finite number of at least zero, else raise ``InvalidInputError``."""
+    if not 0 <= value < np.inf:
+        raise InvalidInputError(f"{name}: {value!r}; expected a finite number of at least 0")
+    return float(value)

@@ -1,0 +1,143 @@
+"""Our recogniser in loops of others."""
+
+import gymnasium
+import numpy as np
+import pytest
+
+from atg_fg.core.assumptions import arcube_assumptions
+from atg_fg.core.errors import InvalidInputError, UnknownNameError
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.experiments.exploration import complete_memory
+from atg_fg.experiments.recognition_agent import RecognitionAgent
+from atg_fg.policies import StoppingPolicy, make_policy
+from atg_fg.storage.presets import preset
+from atg_fg.worlds.arcube import make_arcubes
+from atg_fg.worlds.arcube_world import ARcubeWorld
+from atg_fg.worlds.base import MISSING
+from tests.small import trial
+
+CUBES = make_arcubes(6, seed=0)
+PARAMETERS = preset("default")
+
+
+@pytest.fixture
+def memory():
+    """All that there is to know of the first five of six cubes."""
+    return complete_memory(arcube_assumptions(6), CUBES[:5])
+
+
+def test_it_recognises_an_object_in_a_plain_loop(memory):
+    agent, world = RecognitionAgent(memory, PARAMETERS), ARcubeWorld(CUBES)
+    for presented in range(6):
+        observation, _ = world.reset(seed=presented, options={"object": presented})
+        agent.reset()
+        for _ in range(8):
+            observation, *_ = world.step(np.int64(agent(observation)))
+        agent.observe(observation)
+        known = None if agent.belief.is_novel else agent.belief.most_probable_object
+        assert known == (None if presented == 5 else presented)
+
+
+def test_its_belief_is_that_of_a_trial_with_the_same_looks_and_actions(memory):
+    agent = RecognitionAgent(memory, PARAMETERS)
+    actions = [int(agent.predict(np.array(look))[0]) for look in ((0, 1), (2, 3))]
+    agent.observe([4, MISSING])
+    assert agent.inference.history.actions == actions
+    looks = agent.inference.history.evidence
+    assert [look.pattern is None for look in looks] == [False, False, True]
+    again = trial("gtsam", memory, PARAMETERS)
+    for look, action in zip(looks, [*actions, None], strict=True):
+        again.observe(look)
+        if action is not None:
+            again.act(action)
+    np.testing.assert_allclose(again.identity().probabilities, agent.belief.probabilities, atol=1e-12)
+
+
+def test_an_action_is_what_a_world_takes(memory):
+    action, state = RecognitionAgent(memory, PARAMETERS).predict(np.array([0, 1]))
+    assert state is None
+    assert ARcubeWorld(CUBES).action_space.contains(action.item())
+    assert (action.shape, action.dtype) == ((), np.int64)
+
+
+def test_many_worlds_have_a_belief_each(memory):
+    agent = RecognitionAgent(memory, PARAMETERS)
+    worlds = [ARcubeWorld(CUBES) for _ in range(3)]
+    looks = np.array([world.reset(seed=i, options={"object": i})[0] for i, world in enumerate(worlds)])
+    starts = np.ones(3, dtype=bool)
+    for _ in range(8):
+        actions, _ = agent.predict(looks, state=None, episode_start=starts, deterministic=True)
+        looks = np.array([world.step(action)[0] for world, action in zip(worlds, actions, strict=True)])
+        starts = np.zeros(3, dtype=bool)
+    agent.observe(looks)
+    assert [each.identity().most_probable_object for each in agent.trials] == [0, 1, 2]
+
+
+def test_a_trial_begins_where_an_episode_does_and_goes_on_elsewhere(memory):
+    agent = RecognitionAgent(memory, PARAMETERS)
+    looks = np.array([[0, 1], [0, 1]])
+    agent.predict(looks)
+    agent.predict(looks, episode_start=np.array([False, True]))
+    assert [len(each.history.evidence) for each in agent.trials] == [2, 1]
+
+
+def test_the_same_seed_chooses_alike_and_ties_are_broken_by_it(memory):
+    def choices(seed):
+        agent = RecognitionAgent(memory, PARAMETERS, policy="random", seed=seed)
+        return [agent([0, 1]) for _ in range(20)]
+
+    assert choices(1) == choices(1)
+    assert choices(1) != choices(2)
+
+
+def test_the_memory_is_not_changed(memory):
+    before = memory.copy()
+    agent = RecognitionAgent(memory, PARAMETERS)
+    agent([0, 1])
+    agent.observe([2, 3])
+    assert memory == before
+
+
+@pytest.mark.parametrize(
+    ("observation", "message"),
+    [
+        ([0], r"shape \(1,\); expected \(2,\) for one world, or \(worlds, 2\)"),
+        (np.zeros((1, 1, 2), int), "shape"),
+        (np.zeros((0, 2), int), "shape"),
+        ([0, 12], "symbol 12; expected 0 to 11"),
+        ([3, 3], "symbol 3 is repeated"),
+    ],
+)
+def test_other_observations_are_refused_and_change_nothing(memory, observation, message):
+    agent = RecognitionAgent(memory, PARAMETERS)
+    with pytest.raises(InvalidInputError, match=message):
+        agent.predict(observation)
+    assert agent.trials == []
+
+
+def test_what_makes_no_sense_is_refused(memory):
+    agent = RecognitionAgent(memory, PARAMETERS)
+    with pytest.raises(InvalidInputError, match="nothing seen yet"):
+        _ = agent.belief
+    agent.predict([[0, 1], [0, 1]])
+    with pytest.raises(InvalidInputError, match="observations of 1 worlds; expected 2 as before"):
+        agent([0, 1])
+    with pytest.raises(UnknownNameError, match="engine"):
+        RecognitionAgent(memory, PARAMETERS, engine="magic")
+    with pytest.raises(UnknownNameError, match="policy"):
+        RecognitionAgent(memory, PARAMETERS, policy="magic")
+    ends = RecognitionAgent(memory, PARAMETERS, policy=StoppingPolicy(make_policy("entropy"), 100.0))
+    with pytest.raises(InvalidInputError, match="the policy ends the trial"):
+        ends([0, 1])
+
+
+# torch and pandas have warnings of their own when they are loaded.
+@pytest.mark.filterwarnings("ignore")
+def test_stable_baselines3_evaluates_it(memory):
+    evaluation = pytest.importorskip(
+        "stable_baselines3.common.evaluation", reason="Stable-Baselines3 is not installed: pip install atg-fg[agents]"
+    )
+    agent = RecognitionAgent(memory, ModelParameters())
+    world = gymnasium.wrappers.TimeLimit(ARcubeWorld(CUBES), max_episode_steps=4)
+    rewards, lengths = evaluation.evaluate_policy(agent, world, n_eval_episodes=3, return_episode_rewards=True)
+    assert (rewards, lengths) == ([0.0] * 3, [4] * 3)

@@ -1,0 +1,123 @@
+import gzip
+import json
+
+import numpy as np
+import pytest
+
+from atg_fg.core.assumptions import arcube_assumptions
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.records import TrialOutcome
+from atg_fg.engines import begin_trial
+from atg_fg.experiments.trial import run_trial
+from atg_fg.policies import RandomPolicy
+from atg_fg.storage.presets import preset
+from atg_fg.storage.trial_log import TrialLog, read_trials
+from atg_fg.worlds.registry import make_world
+
+HEADER = {"seed": 3, "world": "ideal"}
+ASSUMPTIONS = arcube_assumptions()
+
+
+def a_record(seed, **world_options):
+    inference = begin_trial("bayes-filter", RobotMemory(ASSUMPTIONS), preset("default"))
+    return run_trial(make_world("ideal", **world_options), inference, RandomPolicy(), 4, np.random.default_rng(seed))
+
+
+def a_log(path, header=HEADER):
+    return TrialLog(path, header, ASSUMPTIONS)
+
+
+@pytest.fixture
+def path(tmp_path):
+    return tmp_path / "test-0003.jsonl.gz"
+
+
+@pytest.fixture
+def records():
+    return [a_record(seed, missing=0.2) for seed in range(3)]
+
+
+def test_what_is_read_back_is_what_was_written(path, records):
+    log = a_log(path)
+    assert log.begin() == []
+    for record in records:
+        log.append(record)
+    assert a_log(path).resume() == [TrialOutcome.of(record) for record in records]
+
+
+def test_the_file_is_plain_gzip_with_a_line_a_trial(path, records):
+    log = a_log(path)
+    log.begin()
+    log.append(records[0])
+    header, trial = map(json.loads, gzip.decompress(path.read_bytes()).splitlines())
+    assert header == {"format": "atg-fg/test", "version": 1, **HEADER}
+    assert trial["actions"] == [ASSUMPTIONS.actions[action] for action in records[0].actions]
+    assert [tuple(seen) for seen in trial["observed"]] == [step.detection for step in records[0].steps]
+    assert trial["truth"][0]["object"] == records[0].steps[0].truth["object"]
+    assert read_trials(path) == [trial]
+
+
+def test_the_same_trials_give_the_same_bytes(tmp_path, records):
+    for name in ("a", "b"):
+        log = a_log(tmp_path / name)
+        log.begin()
+        log.append(records[1])
+    assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
+
+
+@pytest.mark.parametrize("cut", [1, 10, 50])
+def test_half_a_trial_at_the_end_is_cut_off(path, records, cut):
+    log = a_log(path)
+    log.begin()
+    log.append(records[0])
+    sound = path.read_bytes()
+    log.append(records[1])
+    whole = path.read_bytes()
+    path.write_bytes(whole[:-cut])
+    assert a_log(path).resume() == [TrialOutcome.of(records[0])]
+    assert path.read_bytes() == sound
+    a_log(path).append(records[1])
+    assert path.read_bytes() == whole
+
+
+def test_a_log_that_is_not_there_is_begun(path):
+    assert a_log(path).resume() == []
+    assert read_trials(path) == []
+
+
+def test_a_log_is_never_overwritten(path, records):
+    log = a_log(path)
+    log.begin()
+    log.append(records[0])
+    before = path.read_bytes()
+    with pytest.raises(InvalidInputError, match="already there"):
+        a_log(path).begin()
+    assert path.read_bytes() == before
+
+
+def test_the_log_of_another_test_is_refused(path):
+    a_log(path).begin()
+    with pytest.raises(InvalidInputError, match=r"test-0003.*\"seed\": 3.*expected.*\"seed\": 4"):
+        a_log(path, {**HEADER, "seed": 4}).resume()
+
+
+@pytest.mark.parametrize(
+    "content",
+    [b"not gzip", gzip.compress(b"[1", mtime=0), gzip.compress(b'{"format": "other"}', mtime=0), b""],
+    ids=["not gzip", "not JSON", "another format", "empty"],
+)
+def test_other_files_are_refused_by_name(path, content):
+    path.write_bytes(content)
+    for read in (a_log(path).resume, lambda: read_trials(path)):
+        with pytest.raises(InvalidInputError, match=r"test-0003"):
+            read()
+    assert path.read_bytes() == content
+
+
+def test_a_trial_without_its_parts_is_refused(path):
+    a_log(path).begin()
+    with path.open("ab") as file:
+        file.write(gzip.compress(b'{"verdict": "novel"}\n'))
+    with pytest.raises(InvalidInputError, match="expected a trial a line"):
+        a_log(path).resume()
