@@ -16,6 +16,7 @@ import pybullet
 from numpy.typing import NDArray
 
 from atg_fg.core.patterns import FloatArray
+from atg_fg.senses import tags
 from atg_fg.worlds.arcube import BACK, LEFT, N_TAGS, ORIENTATIONS, TOP, Cube
 
 CUBE_SIZE: Final = 0.28  # m
@@ -29,7 +30,7 @@ CUBE_CENTRE: Final[FloatArray] = np.array([0.42, 0.0, 0.30])
 
 
 #: 5×5 tags: the first twelve differ in at least 10 bits, those of the 4×4 dictionary in 5.
-TAG_DICTIONARY: Final = cv2.aruco.DICT_5X5_50
+TAG_DICTIONARY: Final = "5X5_50"
 
 
 #: Outward normal of each face in the order of ``atg_fg.worlds.arcube.FACES``, shape [6, 3].
@@ -50,8 +51,7 @@ _FACE_PIXELS = 112  # the face is 4/3 of the tag
 
 def tag_image(symbol: int, pixels: int = _TAG_PIXELS) -> NDArray[np.uint8]:
     """Return the ArUco tag of a symbol in grey levels, shape [pixels, pixels]."""
-    dictionary = cv2.aruco.getPredefinedDictionary(TAG_DICTIONARY)
-    return np.asarray(cv2.aruco.generateImageMarker(dictionary, symbol, pixels), dtype=np.uint8)
+    return tags.tag_image(TAG_DICTIONARY, symbol, pixels)
 
 
 def face_image(symbol: int) -> NDArray[np.uint8]:

@@ -9,8 +9,8 @@ from typing import Final
 import numpy as np
 
 from atg_fg.core.patterns import FloatArray
-from sim.bodies.cube import CUBE_CENTRE
-from sim.vision.tag_detection import Marker
+from atg_fg.senses.tags import DetectedTag
+from sim.bodies.cube import CUBE_CENTRE, CUBE_SIZE
 
 #: How upright a tag's normal must be to be the top's, and how level to be a side's (cosines).
 _UPRIGHT: Final = 0.85
@@ -19,7 +19,7 @@ _UPRIGHT: Final = 0.85
 _LEVEL: Final = 0.35
 
 
-def cube_pose(markers: Sequence[Marker]) -> CubePose | None:
+def cube_pose(markers: Sequence[DetectedTag]) -> CubePose | None:
     """Return where the cube stands, or ``None`` if no tag shows it.
 
     The top tag is measured best, since the camera looks down; a side's is used if there is no other. The table's height
@@ -32,7 +32,7 @@ def cube_pose(markers: Sequence[Marker]) -> CubePose | None:
     marker = (tops or sides)[0]
     level = marker.rotation[:, 0] if tops else marker.normal
     yaw = (np.arctan2(level[1], level[0]) + np.pi / 4) % (np.pi / 2) - np.pi / 4
-    return CubePose(np.array([*marker.cube_centre[:2], CUBE_CENTRE[2]]), float(yaw))
+    return CubePose(np.array([*marker.behind(CUBE_SIZE / 2)[:2], CUBE_CENTRE[2]]), float(yaw))
 
 
 #: Off by more than this, the cube is squared.

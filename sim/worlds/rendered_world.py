@@ -12,12 +12,13 @@ from numpy.typing import NDArray
 
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.patterns import FloatArray
+from atg_fg.senses.tags import DetectedTag
 from atg_fg.worlds.arcube import Cube
 from atg_fg.worlds.arcube_world import ARcubeWorld
 from sim.bodies.cube import CUBE_CENTRE, CUBE_SIZE, CubeBody, rotation_of
 from sim.vision.camera import Camera
 from sim.vision.image_noise import Imaging, at_least_zero
-from sim.vision.tag_detection import Marker, detect_markers, detected_symbols, draw_detections
+from sim.vision.tag_detection import detect_markers, detected_symbols, draw_detections
 from sim.worlds.rerun_entities import log_camera, log_cube, log_links, log_pose, log_shapes, log_world
 
 _MOST_PIXELS: Final = 2048
@@ -73,7 +74,7 @@ class RenderedARcubeWorld(ARcubeWorld):
         width, height = checked_size(image_size)
         self.camera = Camera(image_size=(width, height))
         self.frame: NDArray[np.uint8] = np.zeros((height, width, 3), dtype=np.uint8)
-        self.markers: list[Marker] = []
+        self.markers: list[DetectedTag] = []
         self._client = pybullet.connect(pybullet.DIRECT)
         # A world that nobody closes must not keep its client until the process ends.
         self._disconnect = weakref.finalize(self, pybullet.disconnect, physicsClientId=self._client)

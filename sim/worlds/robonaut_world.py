@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.patterns import IntArray
+from atg_fg.senses.tags import DetectedTag
 from atg_fg.worlds.arcube import ACTION_SOURCES, SUCCESSORS, Cube, shown_pattern
 from atg_fg.worlds.arcube_world import ARcubeWorld
 from sim.bodies.cube import CUBE_CENTRE, nearest_orientation, rotation_of
@@ -21,7 +22,7 @@ from sim.manipulation.execution import Manipulator, OutOfReachError
 from sim.manipulation.impedance_control import ArmController
 from sim.vision.camera import Camera
 from sim.vision.cube_pose import CubePose, cube_pose
-from sim.vision.tag_detection import Marker, detect_markers, detected_symbols, draw_detections
+from sim.vision.tag_detection import detect_markers, detected_symbols, draw_detections
 from sim.worlds.domain_randomization import Circumstances, condition_named
 from sim.worlds.film import OBSERVER, Film, observed
 from sim.worlds.rendered_world import checked_size
@@ -113,7 +114,7 @@ class RobonautARcubeWorld(ARcubeWorld):
         self._build()
         self.camera = self._head_camera()
         self.frame: NDArray[np.uint8] = np.zeros((*self._image_size[::-1], 3), dtype=np.uint8)
-        self.markers: list[Marker] = []
+        self.markers: list[DetectedTag] = []
         self.lost = False
         self._seen_at = -1
         self._outcome: dict[str, Any] = {}

@@ -13,7 +13,7 @@ from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.patterns import IntArray
 from atg_fg.worlds.arcube import ACTION_SOURCES, ORIENTATIONS, Cube
 from atg_fg.worlds.stations import check_one_a_station, drawn_objects
-from sim.bodies.cube import CUBE_CENTRE, nearest_orientation, rotation_of
+from sim.bodies.cube import CUBE_CENTRE, CUBE_SIZE, nearest_orientation, rotation_of
 from sim.vision.camera import Camera
 from sim.worlds.film import observer_of
 from sim.worlds.robonaut_world import RobonautARcubeWorld
@@ -130,7 +130,9 @@ class RobonautTableWorld(RobonautARcubeWorld):
         """Take a frame, and leave out the tags of cubes that are not before the robot."""
         super()._see()
         self.markers = [
-            marker for marker in self.markers if np.linalg.norm(marker.cube_centre - CUBE_CENTRE) < STATION_SPACING / 2
+            marker
+            for marker in self.markers
+            if np.linalg.norm(marker.behind(CUBE_SIZE / 2) - CUBE_CENTRE) < STATION_SPACING / 2
         ]
 
     def _observer(self) -> Camera:

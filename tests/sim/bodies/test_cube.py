@@ -2,6 +2,7 @@ import cv2
 import numpy as np
 import pytest
 
+from atg_fg.senses.tags import DICTIONARIES
 from atg_fg.worlds.arcube import ACTION_SOURCES, BACK, LEFT, ORIENTATIONS, SUCCESSORS, TOP
 from sim.bodies.cube import FACE_NORMALS, FACE_UPS, TAG_DICTIONARY, face_image, quaternion_of, rotation_of, tag_image
 
@@ -50,7 +51,7 @@ def test_the_world_has_its_back_left_and_top_where_the_robot_sees_them():
 
 
 def test_every_symbol_has_a_tag_of_its_own_that_opencv_reads():
-    detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(TAG_DICTIONARY))
+    detector = cv2.aruco.ArucoDetector(cv2.aruco.getPredefinedDictionary(DICTIONARIES[TAG_DICTIONARY]))
     for symbol in range(12):
         assert tag_image(symbol).shape == (84, 84)
         _, found, _ = detector.detectMarkers(face_image(symbol))

@@ -3,10 +3,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from atg_fg.senses.tags import DetectedTag, TagPose
 from sim.bodies.cube import CUBE_CENTRE, FACE_NORMALS, FACE_UPS
 from sim.manipulation.waypoints import about_vertical
 from sim.vision.cube_pose import cube_pose
-from sim.vision.tag_detection import Marker
 
 FRONT, BACK, LEFT, RIGHT, TOP, BOTTOM = range(6)
 
@@ -21,7 +21,8 @@ def marker(face, *, centre=CUBE_CENTRE, degrees=0.0, lean=0.0, quarters=0):
     normal, up = FACE_NORMALS[face], FACE_UPS[face]
     tag = np.column_stack([np.cross(up, normal), up, normal]) @ np.round(about_vertical(quarters * np.pi / 2))
     rotation = forward @ about_vertical(np.radians(degrees)) @ tag
-    return Marker(face, np.zeros((4, 2)), np.asarray(centre) + 0.14 * rotation[:, 2], rotation)
+    pose = TagPose(np.asarray(centre) + 0.14 * rotation[:, 2], rotation)
+    return DetectedTag(face, face, np.zeros((4, 2)), 0, np.zeros((5, 5)), pose)
 
 
 def test_nothing_seen_is_nothing_known():

@@ -1,10 +1,11 @@
 import numpy as np
 import pytest
 
+from atg_fg.senses.tags import DetectedTag, TagPose
 from atg_fg.worlds.base import MISSING
-from sim.bodies.cube import CUBE_CENTRE
+from sim.bodies.cube import CUBE_CENTRE, CUBE_SIZE
 from sim.vision.camera import Camera, Light
-from sim.vision.tag_detection import Marker, detect_markers, detected_symbols, draw_detections, slot_marker
+from sim.vision.tag_detection import detect_markers, detected_symbols, draw_detections, slot_markers
 from sim.worlds.rendered_world import RenderedARcubeWorld
 
 FRONT, TOP, LEFT, TILTED = [-1, 0, 0], [0, 0, 1], [0, 1, 0], [-1, 0, 0.5]
@@ -13,7 +14,8 @@ FRONT, TOP, LEFT, TILTED = [-1, 0, 0], [0, 0, 1], [0, 1, 0], [-1, 0, 0.5]
 def marker(symbol, normal):
     normal = np.array(normal, dtype=float) / np.linalg.norm(normal)
     rotation = np.column_stack([np.zeros(3), np.zeros(3), normal])
-    return Marker(symbol, np.array([[40.0, 40], [80, 40], [80, 80], [40, 80]]), np.zeros(3), rotation)
+    corners = np.array([[40.0, 40], [80, 40], [80, 80], [40, 80]])
+    return DetectedTag(symbol, symbol, corners, 0, np.zeros((5, 5)), TagPose(np.zeros(3), rotation))
 
 
 @pytest.fixture
@@ -50,8 +52,8 @@ def test_pose_of_the_cube_is_measured_to_a_centimetre(world):
         world.reset(seed=0, options={"object": 1, "orientation": orientation})
         markers = detect_markers(camera.render(world._client, Light()), camera)
         assert len(markers) == 2
-        top = slot_marker(markers, "top")
-        assert np.linalg.norm(top.cube_centre - CUBE_CENTRE) < 0.01
+        top = slot_markers(markers)["top"]
+        assert np.linalg.norm(top.behind(CUBE_SIZE / 2) - CUBE_CENTRE) < 0.01
         assert top.normal @ [0, 0, 1] > np.cos(np.radians(3))
 
 
@@ -77,7 +79,7 @@ def test_pose_holds_to_a_centimetre_from_both_tags_under_jitter_and_noise():
     made = RenderedARcubeWorld(position_jitter=0.02, yaw_jitter=5.0, image_noise=10.0)
     for seed in range(24):
         _, truth = made.reset(seed=seed, options={"orientation": seed})
-        slots = [slot_marker(made.markers, slot) for slot in ("front", "top")]
-        centre = np.mean([found.cube_centre for found in slots if found is not None], axis=0)
+        slots = slot_markers(made.markers).values()
+        centre = np.mean([found.behind(CUBE_SIZE / 2) for found in slots if found is not None], axis=0)
         assert np.linalg.norm(centre - truth["position"]) < 0.01
     made.close()

@@ -9,7 +9,7 @@ from atg_fg.core.errors import InvalidInputError, UnknownNameError
 from atg_fg.worlds.arcube_world import ARcubeWorld
 from atg_fg.worlds.base import MISSING
 from atg_fg.worlds.stations import AtStation, StationsWorld, make_stations
-from sim.bodies.cube import rotation_of
+from sim.bodies.cube import CUBE_SIZE, rotation_of
 from sim.bodies.rail import RAIL_FORCE, RAIL_SPEED
 from sim.vision.tag_detection import detect_markers
 from sim.worlds.scene import STATION_SPACING, TABLE_SIZE
@@ -151,7 +151,7 @@ def test_neighbours_tags_are_not_taken_for_those_of_the_cube_here(make):
     observation, info = world.reset(seed=0)
     world.step(SECOND)
     seen = detect_markers(world.frame, world.camera)
-    others = [marker for marker in seen if abs(marker.cube_centre[1]) > STATION_SPACING / 2]
+    others = [marker for marker in seen if abs(marker.behind(CUBE_SIZE / 2)[1]) > STATION_SPACING / 2]
     assert others
     assert len(world.markers) == len(seen) - len(others)
     lose(world, 1)
