@@ -36,6 +36,10 @@ class BusyMemoryError(AtgError, TimeoutError):
     """A memory database that another process was writing to for longer than this one waited."""
 
 
+class CameraError(AtgError, OSError):
+    """A camera, a video or a folder of images that gives no frames, or none in time."""
+
+
 class MissingDependencyError(AtgError, ImportError):
     """An optional package that is not installed; the message names the extra that brings it."""
 
