@@ -1,0 +1,48 @@
+"""Pictures of tags whose truth is known: drawn flat, or seen by a camera of a known pose."""
+
+import cv2
+import numpy as np
+
+from atg_fg.senses.tags import tag_image
+
+INTRINSICS = np.array([[600.0, 0, 320], [0, 600, 240], [0, 0, 1]])
+
+
+def sheet(dictionary, ids, side=90, columns=4):
+    """Tags in rows on white, RGB."""
+    rows = -(-len(ids) // columns)
+    step = side + 40
+    page = np.full((rows * step + 40, columns * step + 40), 255, dtype=np.uint8)
+    for place, tag_id in enumerate(ids):
+        row, column = divmod(place, columns)
+        y, x = 40 + row * step, 40 + column * step
+        page[y : y + side, x : x + side] = tag_image(dictionary, tag_id, side)
+    return np.repeat(page[:, :, None], 3, axis=2)
+
+
+def turned(axis, degrees):
+    return cv2.Rodrigues(np.radians(degrees) * np.array(axis, dtype=float))[0]
+
+
+#: From a tag that faces the camera (x right, y up, z towards it) to the camera's frame.
+FACING = np.diag([1.0, -1.0, -1.0])
+
+
+def seen(dictionary, tag_id, rotation, position, size=0.05, shape=(480, 640), distortion=None):
+    """A tag of ``size`` metres at a pose in the camera's frame, on white, RGB: each pixel is asked what it looks at."""
+    side = 400
+    flat = np.full((side * 3 // 2, side * 3 // 2), 255, dtype=np.uint8)
+    margin = side // 4
+    flat[margin : margin + side, margin : margin + side] = tag_image(dictionary, tag_id, side)
+    y, x = np.mgrid[: shape[0], : shape[1]].astype(np.float64)
+    pixels = np.stack([x.ravel(), y.ravel()], axis=1)[:, None]
+    rays = cv2.undistortPoints(pixels, INTRINSICS, distortion).reshape(-1, 2)
+    directions = np.column_stack([rays, np.ones(len(rays))])
+    normal = rotation[:, 2]
+    distance = (normal @ position) / (directions @ normal)
+    on_plane = (directions * distance[:, None] - position) @ rotation[:, :2]
+    column = (on_plane[:, 0] / size + 0.75) * side - 0.5
+    row = (0.75 - on_plane[:, 1] / size) * side - 0.5
+    maps = [part.reshape(shape).astype(np.float32) for part in (column, row)]
+    grey = cv2.remap(flat, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=255)
+    return np.repeat(grey[:, :, None], 3, axis=2)
