@@ -11,7 +11,7 @@ import typer
 
 from atg_fg.cli import options
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.inference.elimination import queries as uai_inference
+from atg_fg.inference.elimination import queries
 from atg_fg.inference.elimination.discrete_model import DiscreteModel
 from atg_fg.storage import plain_files
 from atg_fg.storage.scripted_trial import read_script
@@ -37,7 +37,7 @@ def solve(
     evidence: Annotated[Path | None, typer.Option(help="Evidence in the UAI format.")] = None,
     limit: Annotated[
         int, typer.Option(help="Refuse if tables would have more entries; 8 bytes each.")
-    ] = uai_inference.DEFAULT_LIMIT,
+    ] = queries.DEFAULT_LIMIT,
     json_file: options.JsonFile = None,
 ) -> None:
     """Solve a model exactly and print the result in the format of the UAI competitions.
@@ -60,7 +60,7 @@ def solve(
 
 
 def _partition(model: DiscreteModel, evidence: dict[int, int], limit: int) -> _Answer:
-    logarithm = uai_inference.log_partition(model, evidence, limit)
+    logarithm = queries.log_partition(model, evidence, limit)
     return repr(logarithm / math.log(10)), {
         "log10_partition": logarithm / math.log(10),
         "log_partition": logarithm,
@@ -68,7 +68,7 @@ def _partition(model: DiscreteModel, evidence: dict[int, int], limit: int) -> _A
 
 
 def _marginals(model: DiscreteModel, evidence: dict[int, int], limit: int) -> _Answer:
-    marginals = [marginal.tolist() for marginal in uai_inference.marginals(model, evidence, limit)]
+    marginals = [marginal.tolist() for marginal in queries.marginals(model, evidence, limit)]
     words = [str(len(marginals))]
     for marginal in marginals:
         words += [str(len(marginal)), *map(repr, marginal)]
@@ -76,7 +76,7 @@ def _marginals(model: DiscreteModel, evidence: dict[int, int], limit: int) -> _A
 
 
 def _explanation(model: DiscreteModel, evidence: dict[int, int], limit: int) -> _Answer:
-    states, log_weight = uai_inference.most_probable_explanation(model, evidence, limit)
+    states, log_weight = queries.most_probable_explanation(model, evidence, limit)
     return " ".join(map(str, (len(states), *states))), {"states": list(states), "log_weight": log_weight}
 
 

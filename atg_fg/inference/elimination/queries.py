@@ -1,10 +1,8 @@
 """Exact inference on any discrete factor graph: partition function, marginals, most probable explanation.
 
-Bucket elimination with GTSAM's factor products, sums and maxima, in an order whose tables are measured before the
-first is made. Observed variables, and those with a single state, are taken out of the tables first.
-
-GTSAM's own elimination of a whole graph is not used: its joint tables are of its choosing, and it keeps weights as
-plain numbers.
+Bucket elimination on logarithms, in an order whose tables are measured before the first is made. Observed variables,
+and those with a single state, are taken out of the tables first. GTSAM does not eliminate here: it chooses its joint
+tables itself, and it keeps weights as plain numbers.
 """
 
 from __future__ import annotations
@@ -17,16 +15,13 @@ import numpy as np
 
 from atg_fg.core.errors import ImpossibleEvidenceError, InvalidInputError
 from atg_fg.core.patterns import FloatArray
+from atg_fg.inference.elimination import tables
 from atg_fg.inference.elimination.discrete_model import DiscreteModel
 from atg_fg.inference.elimination.order import EliminationOrder, EntryBudget, best_order
-from atg_fg.inference.elimination.tables import GtsamTables, LogTables, RangeError, Table, TableArithmetic
+from atg_fg.inference.elimination.tables import Table
 
 #: The most entries that tables may have if nothing else is asked for; 8 bytes each.
 DEFAULT_LIMIT: Final = 2**26
-
-
-#: Tables up to this size are GTSAM's; a larger one would take it seconds and 200 bytes an entry.
-MAX_GTSAM_ENTRIES: Final = 2**16
 
 
 class Explanation(NamedTuple):
@@ -39,14 +34,6 @@ class Explanation(NamedTuple):
 
     states: tuple[int, ...]
     log_weight: float
-
-
-class Bucket(NamedTuple):
-    """What is left of a variable that was eliminated: its weights given the variables eliminated after it."""
-
-    conditional: Table
-    #: Those variables, ascending.
-    others: tuple[int, ...]
 
 
 def log_partition(model: DiscreteModel, evidence: Mapping[int, int] | None = None, limit: int = DEFAULT_LIMIT) -> float:
@@ -85,8 +72,7 @@ def marginals(
     graph = _ReducedGraph(model, evidence or {})
     fixed = sum(model.cardinalities[variable] for variable in graph.states)
     order = graph.order(EntryBudget(limit, together=True, taken=fixed))
-    buckets, _, arithmetic = _eliminated(graph, order, maximise=False, keep=True)
-    by_number = _distributions(buckets, arithmetic)
+    by_number = _distributions(_eliminated(graph, order, maximise=False, keep=True)[0])
     result = [np.empty(0)] * len(model.cardinalities)
     for variable, state in graph.states.items():
         result[variable] = np.zeros(model.cardinalities[variable])
@@ -113,12 +99,11 @@ def most_probable_explanation(
     """
     graph = _ReducedGraph(model, evidence or {})
     order = graph.order(EntryBudget(limit, together=True))
-    buckets, log_weight, arithmetic = _eliminated(graph, order, maximise=True, keep=True)
+    conditionals, log_weight = _eliminated(graph, order, maximise=True, keep=True)
     chosen: dict[int, int] = {}
-    for number in range(len(buckets) - 1, -1, -1):
-        conditional, others = buckets[number]
-        weights = arithmetic.weights(conditional, [chosen[other] for other in others])
-        chosen[number] = int(weights.argmax())
+    for number, conditional in reversed(list(enumerate(conditionals))):
+        place: tuple[slice | int, ...] = (slice(None), *(chosen[other] for other in conditional.scope[1:]))
+        chosen[number] = int(conditional.values[place].argmax())
     states = dict(graph.states)
     states.update({graph.free[order.variables[number]]: state for number, state in chosen.items()})
     return Explanation(tuple(states[variable] for variable in range(len(model.cardinalities))), log_weight)
@@ -162,63 +147,49 @@ class _ReducedGraph:
 
 def _eliminated(
     graph: _ReducedGraph, order: EliminationOrder, *, maximise: bool, keep: bool
-) -> tuple[list[Bucket], float, TableArithmetic]:
-    """Return the buckets in the order of elimination (none if not ``keep``), ln of the total, and their arithmetic."""
-    sizes = [graph.sizes[variable] for variable in order.variables]
-    if max(order.entries, default=0) <= MAX_GTSAM_ENTRIES:
-        try:
-            return _eliminated_by(GtsamTables(sizes), graph, order, maximise=maximise, keep=keep)
-        except RangeError:
-            pass
-    return _eliminated_by(LogTables(sizes), graph, order, maximise=maximise, keep=keep)
-
-
-def _eliminated_by(
-    arithmetic: TableArithmetic, graph: _ReducedGraph, order: EliminationOrder, *, maximise: bool, keep: bool
-) -> tuple[list[Bucket], float, TableArithmetic]:
-    waiting = _tables_by_variable(arithmetic, graph, order)
+) -> tuple[list[Table], float]:
+    """Return each variable's weights given those eliminated after it (none if not ``keep``), and ln of the total."""
+    waiting = _tables_by_variable(graph, order)
     logarithms = list(graph.log_factors)
-    buckets: list[Bucket] = []
-    for number in range(len(order.variables)):
-        tables = waiting[number] or [arithmetic.table((number,), np.ones(arithmetic.sizes[number]))]
+    conditionals: list[Table] = []
+    for number, variable in enumerate(order.variables):
+        factors = waiting[number] or [tables.log_table((number,), np.ones(graph.sizes[variable]))]
         waiting[number] = []
-        product = arithmetic.product(tables)
-        unscaled = arithmetic.message(product, maximise=maximise)
-        message, log_divisor = arithmetic.scaled(unscaled)
+        product = tables.product(factors)
+        unscaled = tables.message(product, maximise=maximise)
+        message, log_divisor = tables.scaled(unscaled)
         if log_divisor == -math.inf:
             raise _impossible()
         logarithms.append(log_divisor)
         if keep:
-            buckets.append(Bucket(arithmetic.conditional(product, unscaled), unscaled.scope))
+            conditionals.append(tables.conditional(product, unscaled))
         if message.scope:
             waiting[message.scope[0]].append(message)
-    return buckets, math.fsum(logarithms), arithmetic
+    return conditionals, math.fsum(logarithms)
 
 
-def _tables_by_variable(
-    arithmetic: TableArithmetic, graph: _ReducedGraph, order: EliminationOrder
-) -> list[list[Table]]:
+def _tables_by_variable(graph: _ReducedGraph, order: EliminationOrder) -> list[list[Table]]:
     """Return the tables of the graph, each with the variable of its scope that is eliminated first."""
     number_of = {variable: number for number, variable in enumerate(order.variables)}
     waiting: list[list[Table]] = [[] for _ in order.variables]
     for scope, values in graph.tables:
         numbers = [number_of[variable] for variable in scope]
         ascending = tuple(sorted(numbers))
-        table = arithmetic.table(ascending, values.transpose([numbers.index(number) for number in ascending]))
+        table = tables.log_table(ascending, values.transpose([numbers.index(number) for number in ascending]))
         waiting[ascending[0]].append(table)
     return waiting
 
 
-def _distributions(buckets: Sequence[Bucket], arithmetic: TableArithmetic) -> list[FloatArray]:
+def _distributions(conditionals: Sequence[Table]) -> list[FloatArray]:
     """Return the distribution of each variable, from the last eliminated to the first and in ascending order."""
     joints: dict[int, Table] = {}
     distributions: list[FloatArray] = []
-    for number in range(len(buckets) - 1, -1, -1):
-        joint, others = buckets[number]
+    for number, joint in reversed(list(enumerate(conditionals))):
+        others = joint.scope[1:]
         if others:
-            joint = arithmetic.joint(joint, arithmetic.marginal(joints[others[0]], others))
+            joint = tables.joint(joint, tables.marginal(joints[others[0]], others))
         joints[number] = joint
-        weights = arithmetic.weights(arithmetic.marginal(joint, (number,)), [])
+        weights = tables.marginal(joint, (number,)).values
         distributions.append(weights / weights.sum())
     return distributions[::-1]
 

@@ -10,7 +10,6 @@ import pytest
 from atg_fg.core.errors import ImpossibleEvidenceError, InvalidInputError, TooLargeError
 from atg_fg.core.patterns import Evidence
 from atg_fg.engines import begin_trial
-from atg_fg.inference.elimination import queries as uai_inference
 from atg_fg.inference.elimination.discrete_model import DiscreteModel
 from atg_fg.inference.elimination.order import EntryBudget, _FillGraph, best_order
 from atg_fg.inference.elimination.queries import log_partition, marginals, most_probable_explanation
@@ -25,16 +24,6 @@ with warnings.catch_warnings():
     import pyagrum
 
     pyagrum.ShaferShenoyMRFInference(pyagrum.MarkovRandomField())
-
-
-@pytest.fixture(params=["gtsam", "logarithms"])
-def way(request, monkeypatch):
-    """Do what follows with GTSAM's factors, and with logarithms."""
-    if request.param == "logarithms":
-        monkeypatch.setattr(uai_inference, "MAX_GTSAM_ENTRIES", 0)
-    else:
-        monkeypatch.setattr(uai_inference, "LogTables", None)
-    return request.param
 
 
 def random_model(rng, *, tree, least=1, descending=False):
@@ -94,7 +83,7 @@ def grid(side, rng):
     return DiscreteModel((2,) * side**2, tuple(((int(a), int(b)), rng.random((2, 2))) for a, b in edges))
 
 
-def test_two_variables_by_hand(way):
+def test_two_variables_by_hand():
     model = read_model("MARKOV 2 2 2 2 1 0 2 0 1 2 0.25 0.75 4 1 3 5 0")
     # Weights: 0.25, 0.75, 3.75, 0.
     assert log_partition(model) == pytest.approx(math.log(4.75), abs=1e-15)
@@ -108,7 +97,7 @@ def test_two_variables_by_hand(way):
     assert most_probable_explanation(model, {1: 1}).states == (0, 1)
 
 
-def test_a_bayes_net_by_hand(way):
+def test_a_bayes_net_by_hand():
     rain = read_model("BAYES 2 2 2 2 1 0 2 0 1 2 0.8 0.2 4 0.9 0.1 0.25 0.75")
     assert log_partition(rain) == pytest.approx(0, abs=1e-15)
     assert math.exp(log_partition(rain, {1: 1})) == pytest.approx(0.23)
@@ -116,14 +105,14 @@ def test_a_bayes_net_by_hand(way):
 
 
 @pytest.mark.parametrize("seed", range(30))
-def test_random_graphs_agree_with_enumeration(way, seed):
+def test_random_graphs_agree_with_enumeration(seed):
     rng = np.random.default_rng(seed)
     model = random_model(rng, tree=seed % 3 == 0)
     assert_solved(model, {})
     assert_solved(model, {0: 0, 2: 0})
 
 
-def test_single_states_isolated_variables_and_empty_scopes(way):
+def test_single_states_isolated_variables_and_empty_scopes():
     model = DiscreteModel((1, 3, 1, 2), (((), np.array(0.5)), ((2, 1), np.array([[1.0, 2.0, 5.0]]))))
     assert log_partition(model) == pytest.approx(math.log(0.5 * 8 * 2))
     np.testing.assert_allclose(np.concatenate(marginals(model)), [1, 1 / 8, 2 / 8, 5 / 8, 1, 0.5, 0.5], rtol=1e-14)
@@ -133,7 +122,7 @@ def test_single_states_isolated_variables_and_empty_scopes(way):
     assert most_probable_explanation(DiscreteModel((1,), ())) == ((0,), 0.0)
 
 
-def test_several_factors_on_the_same_variables_multiply(way):
+def test_several_factors_on_the_same_variables_multiply():
     model = read_model("MARKOV 2 2 3 3 2 0 1 2 1 0 2 0 1 6 1 2 3 4 5 6 6 6 5 4 3 2 1 6 1 1 1 1 1 2")
     assert_solved(model, {})
 
@@ -148,7 +137,7 @@ def impossible_models():
 
 @pytest.mark.parametrize("task", [log_partition, marginals, most_probable_explanation])
 @pytest.mark.parametrize(("model", "evidence"), list(impossible_models()))
-def test_evidence_of_probability_zero_is_said_to_be_impossible(way, task, model, evidence):
+def test_evidence_of_probability_zero_is_said_to_be_impossible(task, model, evidence):
     with pytest.raises(ImpossibleEvidenceError, match="weight zero"):
         task(model, evidence)
 
@@ -204,7 +193,7 @@ def widened(model):
     return DiscreteModel(sizes, tuple(factors))
 
 
-def test_a_partition_function_below_the_least_float_keeps_its_logarithm(way):
+def test_a_partition_function_below_the_least_float_keeps_its_logarithm():
     tiny = chain([[1e-5, 1e-5], [1e-5, 1e-5]], 2001)
     assert log_partition(tiny) == pytest.approx(2001 * math.log(2) - 2000 * 5 * math.log(10), rel=1e-13)
     np.testing.assert_allclose(marginals(tiny)[1000], [0.5, 0.5], rtol=1e-12)
@@ -235,7 +224,7 @@ def test_a_value_that_its_own_table_dwarfs_is_not_forgotten():
         np.testing.assert_allclose(marginal, [0.0, 1.0], atol=1e-6)
 
 
-def test_a_chain_of_500_variables_agrees_with_powers_of_its_matrix(way):
+def test_a_chain_of_500_variables_agrees_with_powers_of_its_matrix():
     table = np.array([[0.9, 0.1, 0.0], [0.2, 0.5, 0.3], [0.0, 0.4, 0.6]])
     model = chain(table, 500)
     powers = [np.linalg.matrix_power(table, length) for length in (0, 250, 499)]
@@ -260,11 +249,7 @@ def test_a_grid_of_10_by_10_agrees_with_its_transfer_matrices():
             )
             column = column @ between
     assert log_partition(model) == pytest.approx(math.log(column.sum()), abs=1e-10)
-    # 2^16 entries are GTSAM's; the same buckets as logarithms agree with it.
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(uai_inference, "MAX_GTSAM_ENTRIES", 0)
-        assert log_partition(model) == pytest.approx(math.log(column.sum()), abs=1e-10)
-        best = most_probable_explanation(model)
+    best = most_probable_explanation(model)
     direct = sum(math.log(table[tuple(best.states[v] for v in scope)]) for scope, table in model.factors)
     assert best.log_weight == pytest.approx(direct, abs=1e-10)
 
