@@ -24,8 +24,7 @@ from atg_fg.inference.interface import Inference
 from atg_fg.inference.joint_factor_graph import JointRecognitionGraph
 from atg_fg.learning.structured_memory import StructuredMemory
 from atg_fg.policies import POLICIES, AgentPolicy, GoalPolicy, StoppingPolicy, make_policy
-from atg_fg.storage.database.keeper import open_memory
-from atg_fg.storage.memory_files import load_memory, save_memory
+from atg_fg.storage.memory_files import load_memory, open_memory, save_memory
 from atg_fg.storage.presets import PRESETS, preset
 from atg_fg.worlds.arcube import make_arcubes
 from atg_fg.worlds.registry import WORLDS, assumptions_of, make_world

@@ -10,7 +10,7 @@ from atg_fg.experiments.goals import GoalRunFile
 from atg_fg.learning.structured_memory import StructuredMemory
 from atg_fg.storage import memory_files, memory_json
 from atg_fg.storage.database.copying import records_in_log
-from atg_fg.storage.database.keeper import open_memory
+from atg_fg.storage.memory_files import open_memory
 from atg_fg.storage.presets import preset
 from atg_fg.storage.scripted_trial import read_script
 from atg_fg.storage.trial_log import read_trials

@@ -20,7 +20,7 @@ from atg_fg.storage.database.checking import faults_of_database
 from atg_fg.storage.database.connection import is_database
 from atg_fg.storage.database.memory_reading import database_holds_memory
 from atg_fg.storage.database.trial_log import read_stored_experiments, read_stored_trials
-from atg_fg.storage.memory_files import load_any_memory
+from atg_fg.storage.memory_files import load_memory
 from atg_fg.storage.memory_json import MEMORY_FORMAT, memory_from_document
 
 app = typer.Typer(
@@ -44,7 +44,7 @@ def show(file: options.MemoryFile, json_file: options.JsonFile = None) -> None:
     """
     options.check_json_option(json_file)
     records = _records(file) if is_database(file) else {}
-    memory = load_any_memory(file) if _holds_memory(file) else None
+    memory = load_memory(file) if _holds_memory(file) else None
     document: dict[str, Any] = {"command": "memory show"}
     if memory is not None:
         assumptions = memory.assumptions
@@ -99,7 +99,7 @@ def check(file: options.MemoryFile, json_file: options.JsonFile = None) -> int:
     """
     options.check_json_option(json_file)
     faults = faults_of_database(file) if is_database(file) else _faults_of_json(file)
-    memory = None if faults or not _holds_memory(file) else load_any_memory(file)
+    memory = None if faults or not _holds_memory(file) else load_memory(file)
     sound: dict[str, Any] = {"sound": not faults}
     if faults:
         sound["faults"] = faults
@@ -123,7 +123,7 @@ def _faults_of_json(file: Path) -> list[str]:
         InvalidInputError: It cannot be read, is not JSON, or is something else.
     """
     if is_compact(file):
-        load_any_memory(file)
+        load_memory(file)
         return []
     document = parse_json(plain_files.read_text_file(file), str(file))
     if not isinstance(document, dict) or document.get("format") != MEMORY_FORMAT:

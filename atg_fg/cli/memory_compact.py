@@ -10,9 +10,8 @@ import typer
 from atg_fg.cli import options
 from atg_fg.core.compact.compact_memory import CompactMemory
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.learning.structured_memory import StructuredMemory
 from atg_fg.storage import memory_files, plain_files
-from atg_fg.storage.compact_file import SUFFIX, is_compact, save_compact_memory
+from atg_fg.storage.compact_file import SUFFIX, is_compact
 
 
 def compact(
@@ -29,10 +28,8 @@ def compact(
         raise InvalidInputError(f"--output: {str(output)!r}; expected a name that ends in {SUFFIX}")
     plain_files.check_writable(output)
     memory = memory_files.load_memory(file)
-    if memory.merges or isinstance(memory, StructuredMemory):
-        raise InvalidInputError(f"{file}: merges or a learned structure; expected ATGs alone, as arrays keep no more")
+    memory_files.save_memory(memory, output)
     made = CompactMemory.of(memory)
-    save_compact_memory(made, output)
     document = {"command": "memory compact", "objects": len(made), "bytes": made.nbytes}
     options.write_json(document, json_file)
     if json_file != "-":

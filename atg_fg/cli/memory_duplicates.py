@@ -16,7 +16,7 @@ from atg_fg.learning.duplicates import find_duplicates
 from atg_fg.learning.structured_memory import StructuredMemory
 from atg_fg.storage import memory_files, plain_files
 from atg_fg.storage.database.connection import is_database
-from atg_fg.storage.database.keeper import open_memory
+from atg_fg.storage.memory_files import open_memory
 from atg_fg.storage.presets import preset as preset_named
 
 

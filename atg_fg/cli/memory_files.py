@@ -16,14 +16,14 @@ from atg_fg.learning.completion import completed_atg
 from atg_fg.learning.memory_union import unite
 from atg_fg.learning.structured_memory import StructuredMemory
 from atg_fg.storage import memory_files, memory_json, plain_files
-from atg_fg.storage.database.connection import is_database, open_to_write, translated, written
+from atg_fg.storage.database.connection import is_database, writing
 from atg_fg.storage.database.copying import add_records, records_in, records_in_log
 from atg_fg.storage.database.memory_reading import database_holds_memory, holds_memory, read_memory_rows
 from atg_fg.storage.database.memory_writing import replace_memory
 from atg_fg.storage.database.trial_log import read_stored_trials
 from atg_fg.storage.graph_export import view_to_dot, view_to_graphml
 from atg_fg.storage.memory_difference import difference
-from atg_fg.storage.memory_files import load_any_memory
+from atg_fg.storage.memory_files import load_memory
 
 GRAPH_FORMATS: Final = {"graphml": view_to_graphml, "dot": view_to_dot}
 EXPORTS: Final = (*GRAPH_FORMATS, "json", "trials")
@@ -53,7 +53,7 @@ def export(
     elif name is not None or completed:
         raise InvalidInputError(f"--format {format_name} is of the whole memory; expected no --name or --completed")
     elif format_name == "json":
-        text = memory_json.memory_to_json(load_any_memory(file))
+        text = memory_json.memory_to_json(load_memory(file))
     else:
         text = _trials_text(file)
     if output is None:
@@ -63,7 +63,7 @@ def export(
 
 
 def _graph_text(file: Path, name: str | None, format_name: str, *, completed: bool) -> str:
-    memory = load_any_memory(file)
+    memory = load_memory(file)
     if not len(memory):
         raise InvalidInputError(f"{file}: the memory is empty; expected at least one ATG to export")
     graph = memory[name if name is not None else memory.names[0]]
@@ -104,20 +104,15 @@ def import_files(
     logs = [file for file in files if _is_log(file)]
     records: list[list[tuple[Experiment | None, list[StoredTrial]]]] = [[records_in_log(file)] for file in logs]
     records += [list(records_in(file)) for file in files if is_database(file)]
-    memories = [memory_files.load_memory(file) for file in files if file not in logs and _has_memory(file)]
+    memories = [load_memory(file) for file in files if file not in logs and _has_memory(file)]
     full = [memory for memory in memories if len(memory)] or memories[:1]
-    with translated(into):
-        connection = open_to_write(into, create=True)
-        try:
-            with written(connection):
-                there = read_memory_rows(connection, str(into)) if holds_memory(connection) else None
-                if len(full) + (there is not None and len(there) > 0) > 1:
-                    raise InvalidInputError(f"{into}: more than one memory; expected one, or atg-fg memory merge first")
-                for memory in full:
-                    replace_memory(connection, memory)
-                added = [add_records(connection, each) for each in records]
-        finally:
-            connection.close()
+    with writing(into, create=True) as connection:
+        there = read_memory_rows(connection, str(into)) if holds_memory(connection) else None
+        if len(full) + (there is not None and len(there) > 0) > 1:
+            raise InvalidInputError(f"{into}: more than one memory; expected one, or atg-fg memory merge first")
+        for memory in full:
+            replace_memory(connection, memory)
+        added = [add_records(connection, each) for each in records]
     n_objects = sum(map(len, full))
     n_experiments, n_trials = (sum(counts[kind] for counts in added) for kind in (0, 1))
     typer.echo(f"{into}: {n_objects} ATGs, {n_experiments} experiments and {n_trials} trials imported")
@@ -152,7 +147,7 @@ def merge(
     plain_files.check_writable(output)
     if output.exists():
         raise InvalidInputError(f"{output}: is already there; expected the path of a new file")
-    union = unite(load_any_memory(first), load_any_memory(second))
+    union = unite(load_memory(first), load_memory(second))
     n_trials = 0
     if memory_files.goes_to_database(output):
         n_trials = _save_with_records(union.memory, output, first, second, union.renamed)
@@ -174,16 +169,11 @@ def merge(
 
 def _save_with_records(memory: RobotMemory, output: Path, first: Path, second: Path, renamed: dict[str, str]) -> int:
     n_trials = 0
-    with translated(output):
-        connection = open_to_write(output, create=True)
-        try:
-            with written(connection):
-                for file, names in ((first, {}), (second, renamed)):
-                    if is_database(file):
-                        n_trials += add_records(connection, records_in(file, names))[1]
-                replace_memory(connection, memory)
-        finally:
-            connection.close()
+    with writing(output, create=True) as connection:
+        for file, names in ((first, {}), (second, renamed)):
+            if is_database(file):
+                n_trials += add_records(connection, records_in(file, names))[1]
+        replace_memory(connection, memory)
     return n_trials
 
 
@@ -197,7 +187,7 @@ def diff(
     Example: atg-fg memory diff before.json robot.db
     """
     options.check_json_option(json_file)
-    found = difference(load_any_memory(first), load_any_memory(second))
+    found = difference(load_memory(first), load_memory(second))
     options.write_json({"command": "memory diff", "same": not found, "difference": found}, json_file)
     if json_file != "-":
         for line in _told(found):

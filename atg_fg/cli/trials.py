@@ -18,17 +18,16 @@ from atg_fg.core.assumptions import arcube_assumptions
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.records import Experiment, StoredTrial, TrialStep
+from atg_fg.core.version import __version__
 from atg_fg.display.frames import FrameFolder
 from atg_fg.engines import begin_trial
 from atg_fg.experiments.replay import replay as replay_script
 from atg_fg.experiments.trial import learn_from, run_trial
 from atg_fg.learning.structured_memory import memory_for
 from atg_fg.policies import make_policy
-from atg_fg.storage import memory_files, plain_files
+from atg_fg.storage import plain_files
 from atg_fg.storage.database.connection import is_database
-from atg_fg.storage.database.keeper import open_memory, software_version
-from atg_fg.storage.database.saving import save_database
-from atg_fg.storage.memory_files import load_any_memory, save_any_memory
+from atg_fg.storage.memory_files import load_memory, open_memory, save_trial
 from atg_fg.storage.presets import preset as preset_named
 from atg_fg.storage.scripted_trial import read_script
 from atg_fg.storage.trial_record import to_json_lines
@@ -112,12 +111,9 @@ def trial(
         del about["seed"]
         remembered.begin_experiment("trial", about, seed)
         learned = learn_from(result, remembered)
-        if save_memory is not None and not remembered.is_kept:
-            if memory_files.goes_to_database(save_memory):
-                experiment = Experiment("trial", about, seed, software_version())
-                save_database(remembered, save_memory, (StoredTrial.of(result, learned),), experiment)
-            else:
-                save_any_memory(remembered, save_memory)
+        if save_memory is not None:
+            experiment = Experiment("trial", about, seed, __version__)
+            save_trial(remembered, save_memory, StoredTrial.of(result, learned), experiment)
     steps = [json.loads(line) for line in lines.splitlines()[1:-1]]
     document = {
         "command": "trial",
@@ -137,7 +133,7 @@ def _opened(memory: Path | None, save_memory: Path | None) -> RobotMemory | None
         return None
     if save_memory is not None and is_database(memory) and save_memory.exists() and memory.samefile(save_memory):
         return open_memory(memory)
-    return load_any_memory(memory)
+    return load_memory(memory)
 
 
 def replay(

@@ -10,7 +10,7 @@ import typer
 from atg_fg.report.page import environment, write_report
 from atg_fg.report.reading import read_report
 from atg_fg.storage import plain_files
-from atg_fg.storage.memory_files import load_any_memory
+from atg_fg.storage.memory_files import load_memory
 
 
 def report(
@@ -35,7 +35,7 @@ def report(
     """
     plain_files.check_writable(output)
     environment()  # fails now rather than at the end, if Jinja2 is not installed
-    remembered = load_any_memory(memory) if memory is not None else None
+    remembered = load_memory(memory) if memory is not None else None
     made = read_report(file, remembered)
     write_report(made, output)
     typer.echo(f"saved: {output}")

@@ -1,65 +1,116 @@
-"""Robot memories on disk, whatever the format."""
+"""Robot memories on disk, whatever the format: arrays, a database or JSON, by the file's content and name."""
 
 from __future__ import annotations
 
 from pathlib import Path
 from typing import Final
 
+from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.compact.compact_memory import CompactMemory
+from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
+from atg_fg.core.records import Experiment, StoredTrial
+from atg_fg.learning.structured_memory import StructuredMemory
 from atg_fg.storage.compact_file import is_compact, load_compact_memory, save_compact_memory
-from atg_fg.storage.database.connection import is_database
-from atg_fg.storage.database.memory_reading import load_database
+from atg_fg.storage.database.connection import WAIT, is_database, open_to_read, open_to_write, translated, written
+from atg_fg.storage.database.keeper import DatabaseKeeper
+from atg_fg.storage.database.memory_reading import holds_memory, load_database, read_memory_rows
+from atg_fg.storage.database.memory_writing import replace_memory
 from atg_fg.storage.database.saving import save_database
 from atg_fg.storage.memory_json import memory_from_json, memory_to_json
 from atg_fg.storage.plain_files import read_text_file, write_bytes_atomically
-
-
-def load_any_memory(path: Path | str) -> RobotMemory:
-    """Load a robot memory from a file of arrays if its name ends in ``.npz``, else from JSON or a database.
-
-    Raises:
-        InvalidInputError: Unreadable, or anything in it is not as it should be; the message names the place.
-    """
-    return load_compact_memory(path) if is_compact(path) else load_memory(path)
-
-
-def save_any_memory(memory: RobotMemory, path: Path | str) -> None:
-    """Save the ATGs of a robot memory as arrays if the file's name ends in ``.npz``, else all as ``save_memory``."""
-    if is_compact(path):
-        save_compact_memory(CompactMemory.of(memory), path)
-    else:
-        save_memory(memory, path)
-
 
 #: Names of new files that become databases.
 DATABASE_SUFFIXES: Final = (".db", ".sqlite", ".sqlite3")
 
 
-def save_memory(memory: RobotMemory, path: Path | str) -> None:
-    """Save a robot memory, with the structure it has learned; the file holds the old one or the new, never a part.
-
-    A database that is there stays one, and its records of trials stay; a new file is a database if its name ends in
-    one of ``DATABASE_SUFFIXES``, else versioned JSON.
-
-    Raises:
-        InvalidInputError: The file cannot be written; what was there is as it was.
-    """
-    if goes_to_database(path):
-        save_database(memory, path)
-    else:
-        write_bytes_atomically(path, memory_to_json(memory).encode())
-
-
 def load_memory(path: Path | str) -> RobotMemory:
-    """Load a robot memory from JSON or a database, whichever the file is by its content.
+    """Load a robot memory from a database, from arrays (``.npz``) or from JSON.
 
     Raises:
         InvalidInputError: Unreadable, or anything in it is not as it should be; the message names the place.
     """
     if is_database(path):
         return load_database(path)
+    if is_compact(path):
+        return load_compact_memory(path)
     return memory_from_json(read_text_file(path), str(path))
+
+
+def save_memory(memory: RobotMemory, path: Path | str) -> None:
+    """Save a robot memory, with the structure it has learned; the file holds the old one or the new, never a part.
+
+    A database that is there stays one, and its records of trials stay; a new file is a database if its name ends in
+    one of ``DATABASE_SUFFIXES``, arrays if it ends in ``.npz``, else versioned JSON.
+
+    Raises:
+        InvalidInputError: The file cannot be written, or arrays cannot hold this memory; what was there is as it was.
+    """
+    if goes_to_database(path):
+        save_database(memory, path)
+    elif is_compact(path):
+        if memory.merges or isinstance(memory, StructuredMemory):
+            raise InvalidInputError(
+                f"{path}: merges or a learned structure; expected ATGs alone, as arrays keep no more"
+            )
+        save_compact_memory(CompactMemory.of(memory), path)
+    else:
+        write_bytes_atomically(path, memory_to_json(memory).encode())
+
+
+def save_trial(memory: RobotMemory, path: Path | str, trial: StoredTrial, experiment: Experiment) -> None:
+    """Save a memory that has learned from a trial; a database gets the record of the trial in the same transaction.
+
+    A memory that is kept in its file has both there already.
+
+    Args:
+        memory: What is to be remembered.
+        path: The file, as for ``save_memory``.
+        trial: The record.
+        experiment: That it belongs to.
+
+    Raises:
+        InvalidInputError: As for ``save_memory``.
+    """
+    if memory.is_kept:
+        return
+    if goes_to_database(path):
+        save_database(memory, path, (trial,), experiment)
+    else:
+        save_memory(memory, path)
+
+
+def open_memory(
+    path: Path | str, assumptions: Assumptions | None = None, *, read_only: bool = False, wait: float = WAIT
+) -> RobotMemory:
+    """Return the memory in a database, which keeps what it learns; one transaction a trial.
+
+    Args:
+        path: The database.
+        assumptions: Of a new memory, if there is none yet; they must be those of the one that is there.
+        read_only: Refuse changes.
+        wait: Seconds to wait for another writer.
+
+    Raises:
+        BusyMemoryError: Another process was writing all that time.
+        InvalidInputError: There is no such database, or anything in it is not as it should be.
+    """
+    with translated(path):
+        create = assumptions is not None and not read_only
+        connection = open_to_read(path) if read_only else open_to_write(path, create=create, wait=wait)
+        try:
+            if assumptions is not None and not read_only:
+                with written(connection):
+                    if not holds_memory(connection):
+                        replace_memory(connection, RobotMemory(assumptions))
+            memory = read_memory_rows(connection, str(path))
+            if assumptions is not None and memory.assumptions != assumptions:
+                raise InvalidInputError(f"{path}: was made under other assumptions: {memory.assumptions}")
+            memory._keeper = DatabaseKeeper(connection, str(path), memory, read_only=read_only)
+        except BaseException:
+            connection.close()
+            raise
+    return memory
 
 
 def goes_to_database(path: Path | str) -> bool:

@@ -4,7 +4,7 @@ import pytest
 
 from atg_fg.core.memory import RobotMemory
 from atg_fg.storage import memory_files
-from atg_fg.storage.database.keeper import open_memory
+from atg_fg.storage.memory_files import open_memory
 from tests.storage.database.small import add_cube, plain
 
 QUICK = ["--engine", "bayes-filter", "--actions", "3"]

@@ -14,7 +14,7 @@ from atg_fg.experiments.table1 import TestPlan, run_test
 from atg_fg.experiments.trial import learn_from
 from atg_fg.report.experiments import EXPERIMENTS
 from atg_fg.report.reading import read_report
-from atg_fg.storage.database.keeper import open_memory
+from atg_fg.storage.memory_files import open_memory
 from atg_fg.storage.trial_log import read_log
 
 RESULTS = Path(__file__).parents[2] / "results"

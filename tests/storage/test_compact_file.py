@@ -12,7 +12,7 @@ from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.storage import memory_files
 from atg_fg.storage.compact_file import load_compact_memory, save_compact_memory
-from atg_fg.storage.memory_files import load_any_memory, save_any_memory
+from atg_fg.storage.memory_files import load_memory, save_memory
 from benchmarks.large_memory import synthetic_memory
 
 
@@ -51,8 +51,8 @@ def test_the_name_says_which_kind_of_file_it_is(tmp_path):
     memory = RobotMemory(arcube_assumptions())
     memory.learn([0, 1, 2], [0, 1], matched=None)
     for name in ("memory.json", "memory.npz"):
-        save_any_memory(memory, tmp_path / name)
-        assert list(load_any_memory(tmp_path / name)) == list(memory)
+        save_memory(memory, tmp_path / name)
+        assert list(load_memory(tmp_path / name)) == list(memory)
     assert memory_files.load_memory(tmp_path / "memory.json") == memory
 
 

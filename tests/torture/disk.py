@@ -27,7 +27,7 @@ from atg_fg.core.errors import AtgError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.storage import memory_files, memory_json
 from atg_fg.storage.database.checking import faults_of_database
-from atg_fg.storage.database.keeper import open_memory
+from atg_fg.storage.memory_files import open_memory
 from atg_fg.worlds.arcube import SUCCESSORS, make_arcubes, shown_pattern
 
 SIZE = 2**21

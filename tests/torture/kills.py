@@ -30,7 +30,7 @@ from atg_fg.learning.search import SearchPlan
 from atg_fg.learning.structured_memory import StructuredMemory, memory_for
 from atg_fg.policies import RandomPolicy
 from atg_fg.storage import memory_json, plain_files
-from atg_fg.storage.database.keeper import open_memory
+from atg_fg.storage.memory_files import open_memory
 from atg_fg.worlds.arcube import make_arcubes
 from atg_fg.worlds.registry import make_world
 

@@ -22,7 +22,7 @@ from atg_fg.experiments.trial import learn_from, run_trial
 from atg_fg.learning.structured_memory import memory_for
 from atg_fg.policies import RandomPolicy
 from atg_fg.storage import memory_files, memory_json
-from atg_fg.storage.database.keeper import open_memory
+from atg_fg.storage.memory_files import open_memory
 from atg_fg.storage.scripted_trial import read_script
 from atg_fg.storage.uai import write_evidence, write_model
 from atg_fg.storage.uai_export import export_trial

@@ -26,7 +26,7 @@ from atg_fg.experiments.replay import replay
 from atg_fg.inference.elimination.queries import log_partition, marginals
 from atg_fg.storage import memory_files, memory_json, plain_files
 from atg_fg.storage.database.checking import faults_of_database
-from atg_fg.storage.database.keeper import open_memory
+from atg_fg.storage.memory_files import open_memory
 from atg_fg.storage.scripted_trial import read_script
 from atg_fg.storage.uai import read_evidence, read_model
 from tests.torture.mutations import FAST, mutated, originals

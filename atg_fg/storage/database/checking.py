@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 
 from atg_fg.core.errors import InvalidInputError
@@ -26,18 +27,15 @@ def faults_of_database(path: Path | str) -> list[str]:
     Raises:
         InvalidInputError: It cannot be opened at all, or is no memory database of this version or before.
     """
-    connection = open_to_read(path)
-    try:
-        faults: list[str] = []
+    faults: list[str] = []
+    with closing(open_to_read(path)) as connection:
         for check in (_integrity, _references, _memory, _records):
             try:
                 with translated(path):
                     faults += check(connection, str(path))
             except InvalidInputError as error:
                 faults.append(str(error))
-        return faults
-    finally:
-        connection.close()
+    return faults
 
 
 def _integrity(connection: sqlite3.Connection, place: str) -> Iterator[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sqlite3
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Final
 from urllib.parse import quote
@@ -129,6 +129,27 @@ def open_to_write(path: Path | str, *, create: bool = False, wait: float = WAIT)
             connection.close()
             raise
     return connection
+
+
+@contextmanager
+def reading(path: Path | str) -> Iterator[sqlite3.Connection]:
+    """Give a connection that reads, with errors as ``open_to_read`` and ``translated`` raise them; close it."""
+    with translated(path), closing(open_to_read(path)) as connection:
+        yield connection
+
+
+@contextmanager
+def writing(path: Path | str, *, create: bool = False, wait: float = WAIT) -> Iterator[sqlite3.Connection]:
+    """Give a connection for one transaction, written at the end or not at all, and close it.
+
+    Arguments and errors are those of ``open_to_write`` and ``translated``.
+    """
+    with (
+        translated(path),
+        closing(open_to_write(path, create=create, wait=wait)) as connection,
+        written(connection),
+    ):
+        yield connection
 
 
 @contextmanager

@@ -9,8 +9,8 @@ from pathlib import Path
 
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.records import Experiment, StoredTrial
+from atg_fg.core.version import __version__
 from atg_fg.storage.database import trial_rows
-from atg_fg.storage.database.keeper import software_version
 from atg_fg.storage.database.trial_log import TEST_KIND, read_stored_experiments, read_stored_trials
 from atg_fg.storage.trial_log import read_log
 
@@ -46,7 +46,7 @@ def records_in_log(path: Path) -> tuple[Experiment, list[StoredTrial]]:
     if isinstance(seed, bool) or not isinstance(seed, int):
         raise InvalidInputError(f"{path}: seed: {seed!r}; expected a whole number")
     trials = [StoredTrial.of_line(line, f"{path}: trial {number}") for number, line in enumerate(lines)]
-    return Experiment(TEST_KIND, header, seed, software_version()), trials
+    return Experiment(TEST_KIND, header, seed, __version__), trials
 
 
 def add_records(

@@ -6,40 +6,17 @@ import contextlib
 import sqlite3
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from pathlib import Path
 from typing import Any
 
-from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import AtgError, InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.records import Experiment, StoredTrial, TrialRecord
+from atg_fg.core.version import __version__
 from atg_fg.learning.structured_memory import StructuredMemory
 from atg_fg.storage.database import trial_rows
-from atg_fg.storage.database.connection import WAIT, open_to_read, open_to_write, roll_back, translated, written
-from atg_fg.storage.database.memory_reading import holds_memory, read_memory_rows
-from atg_fg.storage.database.memory_writing import held_by, replace_memory, write_changes
-
-
-def open_memory(
-    path: Path | str, assumptions: Assumptions | None = None, *, read_only: bool = False, wait: float = WAIT
-) -> RobotMemory:
-    """Return the memory in a database, which keeps what it learns; one transaction a trial."""
-    with translated(path):
-        create = assumptions is not None and not read_only
-        connection = open_to_read(path) if read_only else open_to_write(path, create=create, wait=wait)
-        try:
-            if assumptions is not None and not read_only:
-                with written(connection):
-                    if not holds_memory(connection):
-                        replace_memory(connection, RobotMemory(assumptions))
-            memory = read_memory_rows(connection, str(path))
-            if assumptions is not None and memory.assumptions != assumptions:
-                raise InvalidInputError(f"{path}: was made under other assumptions: {memory.assumptions}")
-            memory._keeper = DatabaseKeeper(connection, str(path), memory, read_only=read_only)
-        except BaseException:
-            connection.close()
-            raise
-    return memory
+from atg_fg.storage.database.connection import roll_back, translated
+from atg_fg.storage.database.memory_reading import read_memory_rows
+from atg_fg.storage.database.memory_writing import held_by, write_changes
 
 
 class DatabaseKeeper:
@@ -92,7 +69,7 @@ class DatabaseKeeper:
 
     def begin_experiment(self, kind: str, parameters: Mapping[str, Any], seed: int | None) -> None:
         """Say what the trials from here on belong to; it is written with the first of them."""
-        self._experiment = Experiment(kind, dict(parameters), seed, software_version())
+        self._experiment = Experiment(kind, dict(parameters), seed, __version__)
 
     def add_record(self, record: TrialRecord, learned: str | None) -> None:
         """Write the record of a trial, inside of a transaction."""
@@ -145,10 +122,3 @@ class DatabaseKeeper:
             with translated(self._place):
                 self._seen = self._data_version()
                 self._load_into(memory)
-
-
-def software_version() -> str:
-    """Return the version of atg-fg, which is known only once all of it is imported."""
-    from atg_fg.core.version import __version__
-
-    return __version__

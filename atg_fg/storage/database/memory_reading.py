@@ -9,7 +9,7 @@ from typing import Any
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.storage.checked_json import parse_json, read_integer, read_object, read_text
-from atg_fg.storage.database.connection import open_to_read, translated
+from atg_fg.storage.database.connection import reading
 from atg_fg.storage.memory_json import MEMORY_FORMAT, memory_from_document
 
 
@@ -19,12 +19,8 @@ def load_database(path: Path | str) -> RobotMemory:
     Raises:
         InvalidInputError: Unreadable, or anything in it is not as it should be; the message names the place.
     """
-    with translated(path):
-        connection = open_to_read(path)
-        try:
-            return read_memory_rows(connection, str(path))
-        finally:
-            connection.close()
+    with reading(path) as connection:
+        return read_memory_rows(connection, str(path))
 
 
 def read_memory_rows(connection: sqlite3.Connection, place: str) -> RobotMemory:
@@ -50,12 +46,8 @@ def database_holds_memory(path: Path | str) -> bool:
     Raises:
         InvalidInputError: It cannot be read.
     """
-    with translated(path):
-        connection = open_to_read(path)
-        try:
-            return holds_memory(connection)
-        finally:
-            connection.close()
+    with reading(path) as connection:
+        return holds_memory(connection)
 
 
 def holds_memory(connection: sqlite3.Connection) -> bool:

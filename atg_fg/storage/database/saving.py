@@ -7,7 +7,7 @@ from pathlib import Path
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.records import Experiment, StoredTrial
 from atg_fg.storage.database import trial_rows
-from atg_fg.storage.database.connection import open_to_write, translated, written
+from atg_fg.storage.database.connection import writing
 from atg_fg.storage.database.memory_writing import replace_memory
 
 
@@ -29,12 +29,7 @@ def save_database(
         BusyMemoryError: Another process was writing all the time that this one waited.
         InvalidInputError: The file cannot be written, or is something else; it is as it was.
     """
-    with translated(path):
-        connection = open_to_write(path, create=True)
-        try:
-            with written(connection):
-                replace_memory(connection, memory)
-                for trial in trials:
-                    experiment = trial_rows.added(connection, experiment, trial)
-        finally:
-            connection.close()
+    with writing(path, create=True) as connection:
+        replace_memory(connection, memory)
+        for trial in trials:
+            experiment = trial_rows.added(connection, experiment, trial)

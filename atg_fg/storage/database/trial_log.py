@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.records import Experiment, StoredTrial, TrialOutcome, TrialRecord
+from atg_fg.core.version import __version__
 from atg_fg.storage.checked_json import plain_json
 from atg_fg.storage.database import trial_rows
-from atg_fg.storage.database.connection import open_to_read, open_to_write, translated, written
-from atg_fg.storage.database.keeper import software_version
+from atg_fg.storage.database.connection import reading, writing
 from atg_fg.storage.trial_log import outcome_of
 
 #: The kind of experiment that a test of the paper is.
@@ -63,29 +64,17 @@ class DatabaseTrialLog:
         """Write a trial, and what is learned from it if that is not what was seen, as one transaction."""
         seen = tuple(record.patterns)
         patterns = None if outcome is None or outcome.patterns == seen else outcome.patterns
-        with translated(self.path):
-            connection = open_to_write(self.path, wait=_WAIT)
-            try:
-                with written(connection):
-                    trial_rows.added(connection, self._experiment, StoredTrial.of(record, None, patterns))
-            finally:
-                connection.close()
+        with writing(self.path, wait=_WAIT) as connection:
+            trial_rows.added(connection, self._experiment, StoredTrial.of(record, None, patterns))
 
     def _open(self) -> bool:
         """Find the experiment, or write it; return whether it was there."""
-        with translated(self.path):
-            connection = open_to_write(self.path, create=True, wait=_WAIT)
-            try:
-                with written(connection):
-                    number = trial_rows.find_experiment(connection, self._experiment)
-                    there = number is not None
-                    if number is None:
-                        number = trial_rows.add_experiment(connection, self._experiment)
-            finally:
-                connection.close()
-        self._experiment = Experiment(
-            TEST_KIND, self._experiment.parameters, self._experiment.seed, self._experiment.version, number
-        )
+        with writing(self.path, create=True, wait=_WAIT) as connection:
+            number = trial_rows.find_experiment(connection, self._experiment)
+            there = number is not None
+            if number is None:
+                number = trial_rows.add_experiment(connection, self._experiment)
+        self._experiment = replace(self._experiment, number=number)
         return there
 
 
@@ -98,19 +87,15 @@ def check_not_in_database(path: Path, header: Mapping[str, Any]) -> None:
     """
     if not path.exists() or not path.stat().st_size:
         return
-    with translated(path):
-        connection = open_to_read(path)
-        try:
-            there = trial_rows.find_experiment(connection, _experiment_of(header)) is not None
-        finally:
-            connection.close()
+    with reading(path) as connection:
+        there = trial_rows.find_experiment(connection, _experiment_of(header)) is not None
     if there:
         raise _already_there(path)
 
 
 def _experiment_of(header: Mapping[str, Any]) -> Experiment:
     parameters = json.loads(json.dumps(header, default=plain_json))
-    return Experiment(TEST_KIND, parameters, parameters.pop("seed"), software_version())
+    return Experiment(TEST_KIND, parameters, parameters.pop("seed"), __version__)
 
 
 def _already_there(path: Path) -> InvalidInputError:
@@ -123,12 +108,8 @@ def read_stored_trials(path: Path | str, experiment: int | None = None) -> Itera
     Raises:
         InvalidInputError: The file cannot be read, or a trial in it is not as it should be.
     """
-    with translated(path):
-        connection = open_to_read(path)
-        try:
-            yield from trial_rows.read_trials(connection, str(path), experiment)
-        finally:
-            connection.close()
+    with reading(path) as connection:
+        yield from trial_rows.read_trials(connection, str(path), experiment)
 
 
 def read_stored_experiments(path: Path | str) -> list[Experiment]:
@@ -137,9 +118,5 @@ def read_stored_experiments(path: Path | str) -> list[Experiment]:
     Raises:
         InvalidInputError: The file cannot be read, or an experiment in it is not as it should be.
     """
-    with translated(path):
-        connection = open_to_read(path)
-        try:
-            return list(trial_rows.read_experiments(connection, str(path)))
-        finally:
-            connection.close()
+    with reading(path) as connection:
+        return list(trial_rows.read_experiments(connection, str(path)))

@@ -6,7 +6,7 @@ import pytest
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.experiments.trial import learn_from
 from atg_fg.storage.database.checking import faults_of_database
-from atg_fg.storage.database.keeper import open_memory
+from atg_fg.storage.memory_files import open_memory
 from tests.storage.database.small import ARCUBES, a_record
 
 

@@ -9,7 +9,7 @@ from atg_fg.experiments.trial import learn_from
 from atg_fg.learning.structured_memory import StructuredMemory, memory_for
 from atg_fg.storage import memory_files, memory_json
 from atg_fg.storage.database.checking import faults_of_database
-from atg_fg.storage.database.keeper import open_memory
+from atg_fg.storage.memory_files import open_memory
 from tests.small import one_slot
 from tests.storage.database.small import ARCUBES, a_record, add_cube, plain, structured
 

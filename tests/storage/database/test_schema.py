@@ -8,7 +8,7 @@ import pytest
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.storage import memory_files, memory_json
 from atg_fg.storage.database import schema
-from atg_fg.storage.database.keeper import open_memory
+from atg_fg.storage.memory_files import open_memory
 from tests.storage.database.small import ARCUBES, add_cube
 
 FIXTURE = Path(__file__).parents[2] / "data" / "formats" / "memory-schema-1.db"
