@@ -18,7 +18,7 @@ from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import IntArray
 from atg_fg.storage.checked_json import check_format, parse_json, placed, read_list, read_object, read_text
 from atg_fg.storage.memory_json import read_assumptions, write_assumptions
-from atg_fg.storage.plain_files import write_bytes_atomically
+from atg_fg.storage.plain_files import starts_with, write_bytes_atomically
 
 COMPACT_FORMAT: Final = "atg-fg/compact-memory"
 
@@ -44,8 +44,8 @@ SUFFIX: Final = ".npz"
 
 
 def is_compact(path: Path | str) -> bool:
-    """Return whether a memory is a file of arrays, by its name."""
-    return Path(path).suffix == SUFFIX
+    """Return whether a memory is a file of arrays, by its name or by how it begins."""
+    return Path(path).suffix == SUFFIX or starts_with(path, b"PK")
 
 
 def save_compact_memory(memory: CompactMemory, path: Path | str) -> None:

@@ -23,6 +23,15 @@ def read_text_file(path: Path | str) -> str:
         raise InvalidInputError(f"{path}: not a UTF-8 text file: {error}") from error
 
 
+def starts_with(path: Path | str, start: bytes) -> bool:
+    """Return whether there is a file at ``path`` that begins with these bytes."""
+    try:
+        with open(path, "rb") as file:
+            return file.read(len(start)) == start
+    except (OSError, ValueError):
+        return False
+
+
 def write_bytes_atomically(path: Path | str, content: bytes) -> None:
     """Write a file so that at any moment its path holds the old content or the new one, never a part.
 

@@ -10,6 +10,7 @@ from atg_fg.core.assumptions import arcube_assumptions
 from atg_fg.core.compact.compact_memory import CompactMemory
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
+from atg_fg.learning.structured_memory import StructuredMemory
 from atg_fg.storage import memory_files
 from atg_fg.storage.compact_file import load_compact_memory, save_compact_memory
 from atg_fg.storage.memory_files import load_memory, save_memory
@@ -54,6 +55,18 @@ def test_the_name_says_which_kind_of_file_it_is(tmp_path):
         save_memory(memory, tmp_path / name)
         assert list(load_memory(tmp_path / name)) == list(memory)
     assert memory_files.load_memory(tmp_path / "memory.json") == memory
+
+
+def test_arrays_are_told_by_how_they_begin_whatever_their_name(file, tmp_path):
+    file.rename(tmp_path / "memory.json")
+    assert list(load_memory(tmp_path / "memory.json")) == list(synthetic_memory(5, seed=0))
+
+
+def test_what_arrays_cannot_hold_is_refused_rather_than_lost(tmp_path):
+    structured = StructuredMemory(arcube_assumptions())
+    with pytest.raises(InvalidInputError, match="expected ATGs alone"):
+        save_memory(structured, tmp_path / "memory.npz")
+    assert not (tmp_path / "memory.npz").exists()
 
 
 def test_what_is_no_such_file_is_refused(file, tmp_path):

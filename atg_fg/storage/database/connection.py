@@ -11,6 +11,7 @@ from urllib.parse import quote
 
 from atg_fg.core.errors import BusyMemoryError, InvalidInputError
 from atg_fg.storage.database import schema
+from atg_fg.storage.plain_files import starts_with
 
 #: Seconds that a writer waits for another one to end its transaction.
 WAIT: Final = 5.0
@@ -34,11 +35,7 @@ _WRITING_FAILED: Final = (
 
 def is_database(path: Path | str) -> bool:
     """Return whether there is an SQLite file at ``path``, whatever its name says."""
-    try:
-        with open(path, "rb") as file:
-            return file.read(len(_MAGIC)) == _MAGIC
-    except (OSError, ValueError):
-        return False
+    return starts_with(path, _MAGIC)
 
 
 @contextmanager
