@@ -3,33 +3,65 @@
 from __future__ import annotations
 
 import sys
-from functools import cache
 from importlib.metadata import entry_points
-from typing import Annotated
+from typing import Annotated, Any, Final
 
 import typer
 import typer.exceptions
 
-from atg_fg.cli import (
-    ablation,
-    demo,
-    doctor,
-    engines,
-    experiments,
-    explain,
-    goal,
-    memory,
-    rescore,
-    structure,
-    trials,
-    uai,
-    watch,
-)
+from atg_fg.cli.lazy_commands import LazyCommand, LazyGroup
 from atg_fg.core.errors import AtgError
 from atg_fg.core.version import __version__
 
+#: The commands, and groups of them, by the panel of the help page that they stand in; each with its place.
+COMMANDS: Final = {
+    "Try it": {
+        "demo": "atg_fg.cli.demo:demo",
+        "trial": "atg_fg.cli.trials:trial",
+        "watch": "atg_fg.cli.watch:watch",
+        "doctor": "atg_fg.cli.doctor:doctor",
+    },
+    "Your data": {
+        "replay": "atg_fg.cli.trials:replay",
+        "explain": "atg_fg.cli.explain:explain",
+        "uai": "atg_fg.cli.uai:app",
+    },
+    "Memory": {
+        "memory": "atg_fg.cli.memory:app",
+        "structure": "atg_fg.cli.structure:app",
+    },
+    "Experiments": {
+        "table1": "atg_fg.cli.experiments:table1",
+        "figure3": "atg_fg.cli.experiments:figure3",
+        "ablation": "atg_fg.cli.ablation:ablation",
+        "rescore": "atg_fg.cli.rescore:rescore",
+        "goal": "atg_fg.cli.goal:goal",
+    },
+    "Engines": {
+        "compare": "atg_fg.cli.engines:compare",
+        "calibrate": "atg_fg.cli.engines:calibrate",
+    },
+}
+
+#: The panels of those that packages beside this one offer by entry points.
+OFFERED: Final = {"report": "Your data", "bench": "Engines", "sim": "Simulation"}
+
+
+class _Commands(LazyGroup):
+    """The commands of this package, and those of packages beside it."""
+
+    def __init__(self, **attributes: Any) -> None:
+        super().__init__(**attributes)
+        for panel, places in COMMANDS.items():
+            for name, place in places.items():
+                self.add_command(LazyCommand(name, place, panel))
+        for entry in entry_points(group="atg_fg.commands"):
+            self.add_command(LazyCommand(entry.name, entry.value, OFFERED.get(entry.name, "More")))
+
+
 app = typer.Typer(
     name="atg-fg",
+    cls=_Commands,
     no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
@@ -54,42 +86,9 @@ def _common(
     """
 
 
-app.command()(demo.demo)
-app.command()(experiments.table1)
-app.command()(experiments.figure3)
-app.command()(ablation.ablation)
-app.command()(rescore.rescore)
-app.command()(goal.goal)
-app.command()(trials.trial)
-app.command()(trials.replay)
-app.command()(explain.explain)
-app.command()(watch.watch)
-app.command()(engines.compare)
-app.command()(engines.calibrate)
-app.command()(doctor.doctor)
-app.add_typer(memory.app, name="memory")
-app.add_typer(structure.app, name="structure")
-app.add_typer(uai.app, name="uai")
-
-
-@cache
-def add_commands_of_packages() -> None:
-    """Add what packages beside this one offer by entry points: groups of commands (``sim``), single ones (``bench``).
-
-    Not done when this package is imported: theirs import it, and could then not be imported by themselves.
-    """
-    for entry in entry_points(group="atg_fg.commands"):
-        added = entry.load()
-        if isinstance(added, typer.Typer):
-            app.add_typer(added, name=entry.name)
-        else:
-            app.command(entry.name)(added)
-
-
 def main() -> None:
     """Run the command line and leave with its exit status."""
     try:
-        add_commands_of_packages()
         status = app(standalone_mode=False)
     except (AtgError, typer.exceptions.TyperException) as error:
         sys.exit(_fail(error))

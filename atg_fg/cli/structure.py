@@ -22,16 +22,10 @@ from atg_fg.learning.learner import BelievedStructure
 from atg_fg.learning.structured_memory import StructuredMemory
 from atg_fg.storage import memory_files
 
-app = typer.Typer(no_args_is_help=True)
-
-
-# Without it typer would make the only command of the group the group itself.
-@app.callback()
-def group() -> None:
-    """Look at the structure that a robot memory has learned.
-
-    Example: atg-fg structure show memory.json
-    """
+app = typer.Typer(
+    help="Look at the structure that a robot memory has learned. Example: atg-fg structure show memory.json",
+    no_args_is_help=True,
+)
 
 
 @app.command()

@@ -211,9 +211,3 @@ def make_recognition_env(
     """
     made = make_world_with(world, n_objects, objects_seed, **dict(world_options or {}))
     return RecognitionEnv(made, RobotMemory(assumptions_of(made, n_objects)), preset_named(preset), **options)
-
-
-gymnasium.register(
-    id="atg_fg/Recognition-v0",
-    entry_point="atg_fg.experiments.recognition_env:make_recognition_env",
-)
