@@ -46,3 +46,14 @@ def test_environments_are_registered_by_the_import():
     for name in ("ARcube", "RingLock", "Recognition"):
         process = subprocess.run([sys.executable, "-c", code.format(name)], capture_output=True, text=True, check=True)
         assert process.stdout == f"atg_fg/{name}-v0\n"
+
+
+def test_an_engine_is_loaded_when_it_is_asked_for():
+    code = (
+        "from atg_fg import RobotMemory, arcube_assumptions, begin_trial, preset\n"
+        "begin_trial('bayes-filter', RobotMemory(arcube_assumptions(2)), preset('paper'))"
+    )
+    loaded = modules_after(code)
+    assert "atg_fg.engines.bayes_filter" in loaded
+    assert not loaded & {"gtsam", "atg_fg.engines.particle_filter"}
+    assert "gtsam" in modules_after(code.replace("bayes-filter", "gtsam"))

@@ -16,8 +16,7 @@ from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, T
 
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.parameters import ModelParameters
-from atg_fg.engines import ENGINES
-from atg_fg.engines.learned_structure import LearnedStructure
+from atg_fg.engines import ENGINES, usual_engine
 from atg_fg.experiments.executors.base import EXECUTORS, check_executor, is_cluster
 from atg_fg.policies import POLICIES, check_settled
 from atg_fg.storage import plain_files
@@ -109,9 +108,7 @@ def _own_option(text: str) -> tuple[str, Any]:
 
 def engine_of(engine: str | None, parameters: ModelParameters, usual: str) -> str:
     """Return the engine that was asked for, or else the usual one, or the one that the parameters need."""
-    if engine is not None:
-        return engine
-    return LearnedStructure.name if parameters.learn_structure else usual
+    return usual_engine(parameters, usual) if engine is None else engine
 
 
 def check_at_least(least: int, **numbers: int | None) -> None:

@@ -2,43 +2,61 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
+from importlib import import_module
 from typing import Any, Final
 
 from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
-from atg_fg.engines.bayes_filter import BayesFilter
-from atg_fg.engines.enumeration import Enumeration
-from atg_fg.engines.gibbs_sampling import GibbsSampling
-from atg_fg.engines.gtsam_elimination import GtsamElimination
-from atg_fg.engines.gtsam_routes import GtsamMarginals, GtsamMultifrontal, GtsamSequential
-from atg_fg.engines.large_memory.engine import LargeMemory
-from atg_fg.engines.learned_structure import LearnedStructure
-from atg_fg.engines.loopy_belief_propagation import LoopyBeliefPropagation
-from atg_fg.engines.mean_field import MeanField
 from atg_fg.engines.options import check_known
-from atg_fg.engines.particle_filter import ParticleFilter
 from atg_fg.inference.interface import Inference
 
-ENGINES: Final[dict[str, type[Inference]]] = {
-    engine.name: engine
-    for engine in (
-        GtsamElimination,
-        BayesFilter,
-        Enumeration,
-        GtsamSequential,
-        GtsamMultifrontal,
-        GtsamMarginals,
-        LoopyBeliefPropagation,
-        ParticleFilter,
-        GibbsSampling,
-        MeanField,
-        LearnedStructure,
-        LargeMemory,
-    )
-}
+
+class Engines(Mapping[str, type[Inference]]):
+    """Classes by name; one is imported when it is first asked for."""
+
+    def __init__(self, places: Mapping[str, str]) -> None:
+        """Name the engines that are at ``places``, written ``module:class``; modules are those of this package."""
+        self._places = dict(places)
+
+    def __getitem__(self, name: str) -> type[Inference]:
+        module, _, engine = self._places[name].partition(":")
+        found: type[Inference] = getattr(import_module(f"{__name__}.{module}"), engine)
+        return found
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._places
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._places)
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+
+ENGINES: Final = Engines(
+    {
+        "gtsam": "gtsam_elimination:GtsamElimination",
+        "bayes-filter": "bayes_filter:BayesFilter",
+        "enumeration": "enumeration:Enumeration",
+        "gtsam-sequential": "gtsam_routes:GtsamSequential",
+        "gtsam-multifrontal": "gtsam_routes:GtsamMultifrontal",
+        "gtsam-marginals": "gtsam_routes:GtsamMarginals",
+        "loopy-bp": "loopy_belief_propagation:LoopyBeliefPropagation",
+        "particle": "particle_filter:ParticleFilter",
+        "gibbs": "gibbs_sampling:GibbsSampling",
+        "mean-field": "mean_field:MeanField",
+        "learned-structure": "learned_structure:LearnedStructure",
+        "large-memory": "large_memory.engine:LargeMemory",
+    }
+)
+
+
+def usual_engine(parameters: ModelParameters, usual: str) -> str:
+    """Return the name of the ``usual`` engine, or of the one that the parameters need."""
+    return "learned-structure" if parameters.learn_structure else usual
 
 
 def check_engine(engine: str, parameters: ModelParameters) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from atg_fg.core.statistics import mean, standard_error
-from atg_fg.engines.learned_structure import LearnedStructure
+from atg_fg.engines import usual_engine
 from atg_fg.experiments.result_log import ResultLog, run_logged
 from atg_fg.experiments.scores import TestResult, pooled_interval
 from atg_fg.experiments.table1 import TestPlan
@@ -69,7 +69,7 @@ class Cell:
         return TestPlan(
             world=self.world,
             world_options=dict(NOISES[self.noise]),
-            engine=LearnedStructure.name if parameters.learn_structure else "bayes-filter",
+            engine=usual_engine(parameters, "bayes-filter"),
             policy=variant.policy,
             parameters=parameters,
             n_actions=self.actions,

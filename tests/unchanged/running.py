@@ -18,7 +18,7 @@ from typing import Any, Final
 import numpy as np
 from typer.testing import CliRunner
 
-from atg_fg.cli import add_commands_of_packages, app
+from atg_fg.cli import app
 from tests.unchanged.cases import COMMAND_WORDS, Case
 
 DATA: Final = Path(__file__).parent / "data"
@@ -32,7 +32,6 @@ _FLOAT: Final = re.compile(r"-?\b\d+(?:\.\d+(?:e[-+]?\d+)?|e[-+]?\d+)")
 def transcript(case: Case) -> str:
     """Return what a case gives: each command, its standard output, its exit status if not 0, and its files."""
     told: list[str] = []
-    add_commands_of_packages()
     with tempfile.TemporaryDirectory() as name, contextlib.chdir(name):
         for folder in _INPUTS:
             shutil.copytree(folder, name, dirs_exist_ok=True)
