@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -101,6 +102,11 @@ def import_files(
 
     Example: atg-fg memory import memory.json records/test-0000.jsonl.gz --into robot.db
     """
+    with ExitStack() as stack:
+        _import([stack.enter_context(plain_files.readable_again(file)) for file in files], into)
+
+
+def _import(files: list[Path], into: Path) -> None:
     logs = [file for file in files if _is_log(file)]
     records: list[list[tuple[Experiment | None, list[StoredTrial]]]] = [[records_in_log(file)] for file in logs]
     records += [list(records_in(file)) for file in files if is_database(file)]

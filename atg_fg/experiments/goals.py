@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import gzip
 import json
-import zlib
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass, field
@@ -28,8 +27,8 @@ from atg_fg.experiments.trial import run_trial
 from atg_fg.inference.all_different import identity_given_others
 from atg_fg.policies import POLICIES, GoalPolicy, make_policy
 from atg_fg.policies.goal import PLANNERS, SETTLED, UNREACHABLE
-from atg_fg.storage.checked_json import plain_json
-from atg_fg.storage.plain_files import make_folder, write_bytes_atomically
+from atg_fg.storage.checked_json import parse_json, plain_json
+from atg_fg.storage.plain_files import make_folder, read_gzipped_text, write_bytes_atomically
 from atg_fg.storage.trial_log import check_not_begun, summary_of
 from atg_fg.worlds.arcube import ORIENTATIONS, make_arcubes, shown_pattern
 from atg_fg.worlds.base import World
@@ -256,10 +255,10 @@ class GoalRunFile:
         Raises:
             InvalidInputError: The file cannot be read, or it is of another run.
         """
+        document = parse_json(read_gzipped_text(self.path, "expected a run that --records wrote"), str(self.path))
         try:
-            document = json.loads(gzip.decompress(self.path.read_bytes()))
             served = tuple(_served(each) for each in document.pop("served"))
-        except (OSError, EOFError, zlib.error, ValueError, KeyError, TypeError, AttributeError) as error:
+        except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise InvalidInputError(
                 f"{self.path}: cannot be read: {error!r}; expected a run that --records wrote"
             ) from error

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import gzip
 import json
-import zlib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
@@ -16,6 +14,7 @@ from atg_fg.report import checked
 from atg_fg.report.content import Report, TrialPage, shown_parameters
 from atg_fg.report.summaries import read_looks, verdict_of, with_graphs
 from atg_fg.storage.checked_json import check_format, parse_json, read_list
+from atg_fg.storage.plain_files import read_gzipped_text
 
 GOAL_RUN_FORMAT: Final = "atg-fg/goal-run"
 _ENDINGS: Final = {
@@ -40,10 +39,7 @@ def read_goal_run(path: Path, memory: RobotMemory | None) -> Report:
     Raises:
         InvalidInputError: The file cannot be read or is not as it should be.
     """
-    try:
-        text = gzip.decompress(path.read_bytes()).decode()
-    except (OSError, EOFError, zlib.error, ValueError) as error:
-        raise InvalidInputError(f"{path}: cannot be read: {error}; expected a run that --records wrote") from error
+    text = read_gzipped_text(path, "expected a run that --records wrote")
     document = parse_json(text, str(path))
     for key in ("format", "version"):
         checked.field_of(document, key, str(path))

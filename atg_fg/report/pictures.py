@@ -7,6 +7,7 @@ from pathlib import Path, PurePosixPath
 from typing import Final
 
 from atg_fg.core.errors import InvalidInputError
+from atg_fg.storage.plain_files import is_plain_file
 
 _KINDS: Final = {b"\x89PNG\r\n\x1a\n": "image/png", b"\xff\xd8\xff": "image/jpeg"}
 _MOST_BYTES: Final = 8_000_000
@@ -30,6 +31,8 @@ def data_address(name: object, folder: Path, place: str) -> str:
     inside = (folder / path).resolve().is_relative_to(folder.resolve())
     if path.is_absolute() or not inside:
         raise InvalidInputError(f"{place}: {name!r}; expected a path inside the record's folder")
+    if not is_plain_file(folder / path):
+        raise InvalidInputError(f"{place}: {name!r} is no file; expected a picture")
     try:
         with (folder / path).open("rb") as file:
             content = file.read(_MOST_BYTES + 1)

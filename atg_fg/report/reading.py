@@ -17,7 +17,7 @@ from atg_fg.report.test_log import read_test_log
 from atg_fg.report.trial_record import read_trial_record
 from atg_fg.storage.checked_json import parse_json
 from atg_fg.storage.database.connection import is_database
-from atg_fg.storage.plain_files import read_text_file
+from atg_fg.storage.plain_files import read_text_file, readable_again
 from atg_fg.storage.trial_record import TRIAL_FORMAT
 
 _GZIP: Final = b"\x1f\x8b"
@@ -39,6 +39,11 @@ def read_report(path: Path, memory: RobotMemory | None = None) -> Report:
     Raises:
         InvalidInputError: The file cannot be read, is of no kind that there is a page for, or has a fault in it.
     """
+    with readable_again(path) as there:
+        return _report_of(there, memory)
+
+
+def _report_of(path: Path, memory: RobotMemory | None) -> Report:
     try:
         with path.open("rb") as file:
             start = file.read(4096)
@@ -61,10 +66,10 @@ def read_report(path: Path, memory: RobotMemory | None = None) -> Report:
 def _is_goal_run(start: bytes) -> bool:
     """Whether a gzipped file begins like a run; its first line may be longer than what was read."""
     try:
-        text = zlib.decompressobj(31).decompress(start)
+        text = zlib.decompressobj(31).decompress(start, 200)
     except zlib.error:
         return False
-    return GOAL_RUN_FORMAT.encode() in text[:200]
+    return GOAL_RUN_FORMAT.encode() in text
 
 
 def _first_line(text: str) -> dict[str, Any]:

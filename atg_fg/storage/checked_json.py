@@ -23,8 +23,8 @@ def parse_json(text: str, place: str) -> Any:
     """
     try:
         return json.loads(text, parse_constant=_refuse_constant, object_pairs_hook=_unique_keys)
-    except (ValueError, RecursionError) as error:
-        raise InvalidInputError(f"{place}: not valid JSON: {error}") from error
+    except (ValueError, RecursionError, MemoryError) as error:
+        raise InvalidInputError(f"{place}: not valid JSON: {str(error) or 'not enough memory'}") from error
 
 
 def plain_json(value: Any) -> Any:

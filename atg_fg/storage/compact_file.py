@@ -14,11 +14,12 @@ import numpy as np
 from atg_fg.core.assumptions import MAX_NUMBER, Assumptions
 from atg_fg.core.compact.columns import AnyIntArray
 from atg_fg.core.compact.compact_memory import CompactMemory, GraphArrays, compacted
-from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.errors import InvalidInputError, TooLargeError
 from atg_fg.core.patterns import IntArray
 from atg_fg.storage.checked_json import check_format, parse_json, placed, read_list, read_object, read_text
+from atg_fg.storage.limits import refuse_size, unpacked_limit
 from atg_fg.storage.memory_json import read_assumptions, write_assumptions
-from atg_fg.storage.plain_files import starts_with, write_bytes_atomically
+from atg_fg.storage.plain_files import read_bytes_file, starts_with, write_bytes_atomically
 
 COMPACT_FORMAT: Final = "atg-fg/compact-memory"
 
@@ -41,6 +42,10 @@ _UNSOUND: Final = (
 
 #: How files of arrays are told from others.
 SUFFIX: Final = ".npz"
+
+
+# Others are unpacked without a limit.
+_PACKINGS: Final = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 
 
 def is_compact(path: Path | str) -> bool:
@@ -72,6 +77,7 @@ def load_compact_memory(path: Path | str) -> CompactMemory:
     Raises:
         InvalidInputError: Unreadable, not such a file, or anything in it is not as it should be; the message names the
             place.
+        TooLargeError: It unfolds to more than ``unpacked_limit`` (``limits.py``).
     """
     place = str(path)
     read = _read_arrays(path, place)
@@ -96,23 +102,39 @@ def load_compact_memory(path: Path | str) -> CompactMemory:
 def _read_arrays(path: Path | str, place: str) -> dict[str, AnyIntArray]:
     """Return the arrays of a file by name: those of ``GraphArrays`` and the header, all of whole numbers."""
     expected = {"header", *GraphArrays._fields}
+    content = read_bytes_file(path)
     try:
-        content = Path(path).read_bytes()
-    except OSError as error:
-        raise InvalidInputError(f"{place}: cannot be read: {error.strerror}") from error
-    try:
-        file = np.load(io.BytesIO(content), allow_pickle=False)
-        found = set(file.files) if isinstance(file, np.lib.npyio.NpzFile) else set()
-        arrays: dict[str, AnyIntArray] = {name: file[name] for name in found}
+        with zipfile.ZipFile(io.BytesIO(content)) as archive:
+            members = archive.infolist()
+            limit = unpacked_limit(len(content))
+            if sum(member.file_size for member in members) > limit:
+                raise refuse_size(path, limit)
+            if sorted(member.filename for member in members) != sorted(f"{name}.npy" for name in expected):
+                raise InvalidInputError(f"{place}: not a compact memory; expected arrays {', '.join(sorted(expected))}")
+            return {
+                member.filename.removesuffix(".npy"): _read_array(archive, member, f"{place}: {member.filename}")
+                for member in members
+            }
     except _UNSOUND as error:
+        if isinstance(error, (InvalidInputError, TooLargeError)):
+            raise
         raise InvalidInputError(f"{place}: not a sound file of arrays: {error}") from error
-    if found != expected:
-        raise InvalidInputError(f"{place}: not a compact memory; expected arrays {', '.join(sorted(expected))}")
-    for name, array in arrays.items():
-        if not isinstance(array, np.ndarray) or array.ndim != 1 or array.dtype.kind not in "iu":
-            kind = f"{array.ndim} dimensions of {array.dtype}" if isinstance(array, np.ndarray) else "no array"
-            raise InvalidInputError(f"{place}: {name}: {kind}; expected one dimension of whole numbers")
-    return arrays
+
+
+def _read_array(archive: zipfile.ZipFile, member: zipfile.ZipInfo, place: str) -> AnyIntArray:
+    """Return an array of one dimension of whole numbers; its size is compared with what is there before it is made."""
+    if member.compress_type not in _PACKINGS:
+        raise InvalidInputError(f"{place}: packed in an unknown way; expected what numpy.savez writes")
+    data = archive.read(member)
+    file = io.BytesIO(data)
+    version = np.lib.format.read_magic(file)
+    reader = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
+    shape, _, dtype = reader(file)
+    if len(shape) != 1 or dtype.kind not in "iu":
+        raise InvalidInputError(f"{place}: {len(shape)} dimensions of {dtype}; expected one dimension of whole numbers")
+    if len(data) - file.tell() != shape[0] * dtype.itemsize:
+        raise InvalidInputError(f"{place}: {len(data) - file.tell()} bytes; expected {shape[0]} whole numbers")
+    return np.frombuffer(data, dtype, offset=file.tell())
 
 
 def check_arrays(arrays: GraphArrays, assumptions: Assumptions, n_objects: int) -> None:

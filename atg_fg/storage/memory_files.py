@@ -18,7 +18,7 @@ from atg_fg.storage.database.memory_reading import holds_memory, load_database, 
 from atg_fg.storage.database.memory_writing import replace_memory
 from atg_fg.storage.database.saving import save_database
 from atg_fg.storage.memory_json import memory_from_json, memory_to_json
-from atg_fg.storage.plain_files import read_text_file, write_bytes_atomically
+from atg_fg.storage.plain_files import is_plain_file, read_text_file, write_bytes_atomically
 
 #: Names of new files that become databases.
 DATABASE_SUFFIXES: Final = (".db", ".sqlite", ".sqlite3")
@@ -116,6 +116,6 @@ def open_memory(
 def goes_to_database(path: Path | str) -> bool:
     """Return whether a memory is saved to ``path`` as a database: by what is there, or else by the name."""
     there = Path(path)
-    if there.is_dir() or (there.exists() and there.stat().st_size > 0):
+    if there.exists() and not (is_plain_file(path) and there.stat().st_size == 0):
         return is_database(path)
     return there.suffix in DATABASE_SUFFIXES

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import sqlite3
+import stat
 from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
@@ -194,9 +196,13 @@ def _migrated_copy(connection: sqlite3.Connection, path: Path | str) -> sqlite3.
 def _check_file(path: Path | str) -> None:
     """Raise ``InvalidInputError`` if there is no file at ``path``, or one that is neither SQLite's nor empty."""
     try:
+        if not stat.S_ISREG(os.stat(path).st_mode):
+            raise InvalidInputError(f"{path}: is no plain file; expected a memory database")
         with open(path, "rb") as file:
             head = file.read(len(_MAGIC))
     except (OSError, ValueError) as error:
+        if isinstance(error, InvalidInputError):
+            raise
         reason = error.strerror if isinstance(error, OSError) else str(error)
         raise InvalidInputError(f"{path}: cannot be read: {reason}") from error
     if head not in (b"", _MAGIC):
