@@ -255,8 +255,9 @@ class GoalRunFile:
         Raises:
             InvalidInputError: The file cannot be read, or it is of another run.
         """
-        document = parse_json(read_gzipped_text(self.path, "expected a run that --records wrote"), str(self.path))
+        text = read_gzipped_text(self.path, "expected a run that --records wrote")
         try:
+            document = parse_json(text, "JSON")
             served = tuple(_served(each) for each in document.pop("served"))
         except (ValueError, KeyError, TypeError, AttributeError) as error:
             raise InvalidInputError(

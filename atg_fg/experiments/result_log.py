@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.experiments.scores import TestResult
 from atg_fg.experiments.table1 import TestPlan, run_tests
-from atg_fg.storage.plain_files import write_bytes_atomically
+from atg_fg.storage.plain_files import append_bytes, read_bytes_file, write_bytes_atomically
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -49,22 +49,25 @@ class ResultLog(Generic[Cell]):
         return self._results.get((cell, seed))
 
     def add(self, cell: Cell, result: TestResult) -> None:
-        """Add the result of a test."""
+        """Add the result of a test.
+
+        Raises:
+            InvalidInputError: The disk is full, or the file cannot be written for another reason.
+        """
         self._results[cell, result.seed] = result
         scores = {name: getattr(result, name) for name in ("identification", "recognition", "success")}
-        with self.path.open("ab") as file:
-            file.write(_line({**asdict(cell), "seed": result.seed, **scores}))
+        append_bytes(self.path, _line({**asdict(cell), "seed": result.seed, **scores}))
 
     def _read(self) -> None:
         try:
-            content = self.path.read_bytes()
+            content = read_bytes_file(self.path)
             sound = content[: content.rfind(b"\n") + 1]  # a writer that was cut off leaves at most half a line
-            header, *lines = [json.loads(line) for line in sound.splitlines()]
+            header, *lines = [json.loads(line) for line in sound.split(b"\n")[:-1]]
             if header != self._header:
                 raise ValueError(f"holds {json.dumps(header)}, not {json.dumps(self._header)}")
             for line in lines:
                 self._take(line)
-        except (OSError, ValueError, KeyError, TypeError) as error:
+        except (ValueError, KeyError, TypeError, IndexError, RecursionError) as error:
             raise InvalidInputError(
                 f"{self.path}: {error}; expected the log of {self._experiment} with such tests"
             ) from error

@@ -112,13 +112,17 @@ def _read_arrays(path: Path | str, place: str) -> dict[str, AnyIntArray]:
             if sorted(member.filename for member in members) != sorted(f"{name}.npy" for name in expected):
                 raise InvalidInputError(f"{place}: not a compact memory; expected arrays {', '.join(sorted(expected))}")
             return {
-                member.filename.removesuffix(".npy"): _read_array(archive, member, f"{place}: {member.filename}")
-                for member in members
+                _name_of(member): _read_array(archive, member, f"{place}: {_name_of(member)}") for member in members
             }
     except _UNSOUND as error:
         if isinstance(error, (InvalidInputError, TooLargeError)):
             raise
-        raise InvalidInputError(f"{place}: not a sound file of arrays: {error}") from error
+        raise InvalidInputError(f"{place}: not a sound file of arrays: {error}; not a compact memory") from error
+
+
+def _name_of(member: zipfile.ZipInfo) -> str:
+    """Return the name of the array in a member of an archive."""
+    return member.filename.removesuffix(".npy")
 
 
 def _read_array(archive: zipfile.ZipFile, member: zipfile.ZipInfo, place: str) -> AnyIntArray:
@@ -130,6 +134,8 @@ def _read_array(archive: zipfile.ZipFile, member: zipfile.ZipInfo, place: str) -
     version = np.lib.format.read_magic(file)
     reader = np.lib.format.read_array_header_1_0 if version == (1, 0) else np.lib.format.read_array_header_2_0
     shape, _, dtype = reader(file)
+    if dtype.hasobject:
+        raise ValueError("an array of Python objects, which are never read")
     if len(shape) != 1 or dtype.kind not in "iu":
         raise InvalidInputError(f"{place}: {len(shape)} dimensions of {dtype}; expected one dimension of whole numbers")
     if len(data) - file.tell() != shape[0] * dtype.itemsize:

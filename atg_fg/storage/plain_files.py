@@ -168,17 +168,18 @@ def append_bytes(path: Path | str, content: bytes, start: int | None = None) -> 
     """Put bytes at the end of a file, or at ``start``, so that they are on the disk; return where they end.
 
     Raises:
-        InvalidInputError: They cannot be written; what the file held before ``start`` is as it was.
+        InvalidInputError: They cannot be written; the file is as long as it was.
     """
     try:
         with open(path, "r+b", buffering=0) as file:
-            begin = file.seek(0, os.SEEK_END) if start is None else file.seek(start)
+            size = file.seek(0, os.SEEK_END)
+            begin = size if start is None else file.seek(start)
             try:
                 _write_all(file.fileno(), content)
                 os.fsync(file.fileno())
             except OSError:
                 with contextlib.suppress(OSError):
-                    file.truncate(begin)
+                    file.truncate(size)
                 raise
     except OSError as error:
         raise InvalidInputError(
@@ -193,12 +194,13 @@ def check_writable(path: Path | str) -> None:
     Called before long work, so that its result is not lost at the end.
     """
     try:
-        status = _status(path)
+        descriptor = _descriptor_of(path)
+        status = _status(path) if descriptor is None else os.fstat(descriptor)
         if status is not None and stat.S_ISDIR(status.st_mode):
             raise _is_folder(path)
         if status is not None and not os.access(path, os.W_OK):
             raise PermissionError(0, "Permission denied")
-        if _descriptor_of(path) is None and (status is None or stat.S_ISREG(status.st_mode)):
+        if descriptor is None and (status is None or stat.S_ISREG(status.st_mode)):
             with tempfile.TemporaryFile(dir=Path(os.path.realpath(path)).parent):
                 pass
     except (OSError, ValueError) as error:

@@ -15,16 +15,14 @@ from pathlib import Path
 from typing import Any
 
 from atg_fg.core.assumptions import Assumptions
-from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.errors import AtgError, InvalidInputError
 from atg_fg.core.patterns import Detection, Evidence
 from atg_fg.core.records import TrialOutcome, TrialRecord
 from atg_fg.storage.checked_json import plain_json
-from atg_fg.storage.plain_files import check_writable, write_bytes_atomically
+from atg_fg.storage.limits import gzip_members
+from atg_fg.storage.plain_files import append_bytes, check_writable, read_bytes_file, write_bytes_atomically
 
 _FORMAT = {"format": "atg-fg/test", "version": 1}
-
-
-_GZIP = 31  # zlib's name for data with a gzip header
 
 
 class TrialLog:
@@ -73,15 +71,15 @@ class TrialLog:
         return [outcome_of(line, self._assumptions, str(self.path)) for line in lines[1:]]
 
     def append(self, record: TrialRecord, outcome: TrialOutcome | None = None) -> None:
-        """Add a trial to the file, and what is learned from it if that is not what was seen."""
+        """Add a trial to the file, and what is learned from it if that is not what was seen.
+
+        Raises:
+            InvalidInputError: The disk is full, or the file cannot be written for another reason; ``resume`` goes on.
+        """
         line = summary_of(record)
         if outcome is not None and outcome.patterns != tuple(record.patterns):
             line["learned"] = outcome.patterns
-        content = _member(line)
-        with self.path.open("r+b") as file:
-            file.seek(self._end)
-            file.write(content)
-        self._end += len(content)
+        self._end = append_bytes(self.path, _member(line), self._end)
 
 
 def outcome_of(line: Mapping[str, Any], assumptions: Assumptions, place: str) -> TrialOutcome:
@@ -153,15 +151,12 @@ def _member(line: Mapping[str, Any]) -> bytes:
 def _sound_lines(path: Path) -> tuple[list[dict[str, Any]], int]:
     """Return the lines of all whole members, and how many bytes they are."""
     try:
-        data = memoryview(path.read_bytes())
         lines, sound = [], 0
-        while sound < len(data):
-            member = zlib.decompressobj(_GZIP)
-            text = member.decompress(data[sound:])
-            if not member.eof:
-                break
+        for text, end in gzip_members(read_bytes_file(path), path):
             lines.append(json.loads(text))
-            sound = len(data) - len(member.unused_data)
-    except (OSError, zlib.error, ValueError) as error:
+            sound = end
+    except (zlib.error, ValueError, RecursionError) as error:
+        if isinstance(error, AtgError):
+            raise
         raise InvalidInputError(f"{path}: cannot be read: {error}; expected a log of trials") from error
     return lines, sound
