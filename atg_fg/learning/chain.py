@@ -1,0 +1,246 @@
+"""One chain of Gibbs sampling over which trials are of one object, where each began, and where actions slipped."""
+
+from __future__ import annotations
+
+import copy
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from atg_fg.core.patterns import FloatArray, IntArray
+from atg_fg.learning import kernels, slip_kernels
+from atg_fg.learning.detector_noise import DetectorNoise
+from atg_fg.learning.kernels import Clusters, TrialArrays
+from atg_fg.learning.number_of_objects import log_new_weights, log_partition
+
+#: Beta prior of a slip.
+SLIP_PRIOR: Final = (1.0, 99.0)
+#: With more trials than this, only those that the new one touches are moved, and some others.
+ALL_TRIALS: Final = 200
+OTHER_TRIALS: Final = 50
+TOUCHED: Final = 1e-3
+
+
+class Structure(NamedTuple):
+    """The one form that all structures compile to.
+
+    Attributes:
+        successors: The state that each action leads to, shape [A, S].
+        registers: The register in each slot in each state, shape [S, J].
+        n_registers: R.
+    """
+
+    successors: IntArray
+    registers: IntArray
+    n_registers: int
+
+
+class Recording(NamedTuple):
+    """All raw trials side by side.
+
+    Attributes:
+        labels: Symbol seen in each slot at each look, −1 where none was, shape [N, T, J].
+        confidences: Of each label, not a number where none was given, shape [N, T, J].
+        actions: That were asked for after each look, shape [N, T].
+        lengths: Number of looks, shape [N].
+        n_symbols: V.
+    """
+
+    labels: IntArray
+    confidences: FloatArray
+    actions: IntArray
+    lengths: IntArray
+    n_symbols: int
+
+
+class Task(NamedTuple):
+    """What the moves of all chains have in common while one trial is taken in.
+
+    Attributes:
+        recording: All raw trials, the new one last.
+        looks: Their likelihoods, shape [N, T, J, V].
+        log_new: ln of the weight of a new object beside each known one, by how many are known.
+        log_partition: ln of the prior of a partition, by the number of objects.
+    """
+
+    recording: Recording
+    looks: FloatArray
+    log_new: FloatArray
+    log_partition: FloatArray
+
+    @classmethod
+    def of(cls, recording: Recording, noise: DetectorNoise, n_objects: int) -> Task:
+        """Return the task of sampling with this noise, where there are at most ``n_objects``."""
+        looks = noise.likelihoods(recording.labels, recording.confidences)
+        n_trials = len(recording.lengths)
+        return cls(
+            recording,
+            looks,
+            log_new_weights(n_objects, n_trials, n_trials + 3),
+            log_partition(n_objects, n_trials, n_trials + 3),
+        )
+
+
+class Chain:
+    """A state of the sampler, and its moves.
+
+    Args:
+        structure: Shared by all objects, or what they begin with.
+        log_prior: ln of its prior.
+        n_symbols: V.
+
+    Attributes:
+        slip: ε, the probability that an action fails.
+        score: ln of the joint probability of all that it believes and saw, averaged over its last sweeps.
+    """
+
+    def __init__(self, structure: Structure, log_prior: float, n_symbols: int) -> None:
+        n_states = len(structure.registers)
+        stay = np.arange(n_states)[None]
+        self.structure, self.log_prior = structure, log_prior
+        self.clusters = Clusters(
+            np.ascontiguousarray(np.concatenate((structure.successors, stay))[None]),
+            np.ascontiguousarray(structure.registers),
+            np.zeros(0, dtype=np.int64),
+            np.zeros((0, structure.n_registers, n_symbols)),
+            np.zeros(0, dtype=np.int64),
+            np.zeros(0, dtype=np.int64),
+            np.zeros(0, dtype=np.int64),
+            np.full(n_symbols, 1.0 / n_symbols),
+        )
+        self.actions: IntArray = np.zeros((0, 0), dtype=np.int64)
+        self.slip = SLIP_PRIOR[0] / sum(SLIP_PRIOR)
+        self.score = -np.inf
+
+    def copy(self) -> Chain:
+        """Return a chain that goes on alone from here."""
+        return copy.deepcopy(self)
+
+    @property
+    def n_states(self) -> int:
+        """S."""
+        return len(self.clusters.registers)
+
+    @property
+    def successors(self) -> IntArray:
+        """Of the shared automaton, shape [A, S]."""
+        return self.clusters.successors[0, :-1]
+
+    def admit(self, task: Task) -> None:
+        """Make room for trials that the chain does not know yet; they are of no object so far."""
+        recording, clusters = task.recording, self.clusters
+        n_trials, n_known = len(recording.lengths), len(clusters.owner)
+        new = n_trials - n_known
+        grown = n_trials + 2 - len(clusters.n_trials)
+        tables = np.broadcast_to(clusters.prior, (grown, *clusters.tables.shape[1:]))
+        self.clusters = clusters._replace(
+            automaton=np.append(clusters.automaton, np.zeros(grown, dtype=np.int64)),
+            tables=np.concatenate((clusters.tables, tables)),
+            n_trials=np.append(clusters.n_trials, np.zeros(grown, dtype=np.int64)),
+            owner=np.append(clusters.owner, np.full(new, -1)),
+            start=np.append(clusters.start, np.zeros(new, dtype=np.int64)),
+        )
+        actions = recording.actions.copy()
+        actions[:n_known, : self.actions.shape[1]] = self.actions
+        self.actions = actions
+
+    def trials(self, task: Task) -> TrialArrays:
+        """Return the trials as this chain takes them to have gone."""
+        return TrialArrays(task.looks, self.actions, task.recording.lengths)
+
+    def scatter(self, rng: np.random.Generator) -> None:
+        """Take each trial for one of an object of its own, with a start drawn at random."""
+        n_trials = len(self.clusters.owner)
+        self.clusters.owner[:] = np.arange(n_trials)
+        self.clusters.n_trials[:] = 0
+        self.clusters.n_trials[:n_trials] = 1
+        self.clusters.start[:] = rng.integers(self.n_states, size=n_trials)
+
+    def place(self, task: Task, numbers: IntArray, rng: np.random.Generator) -> None:
+        """Draw object and start of trials that are of no object yet, one after the other."""
+        self._learn_again(task)
+        kernels.sweep(self.trials(task), numbers, self.clusters, task.log_new, 1.0, rng, np.zeros(0))
+
+    def sweep(self, task: Task, rng: np.random.Generator, beta: float = 1.0, *, automaton: bool = False) -> FloatArray:
+        """Move all trials once, the last one at the end; return p(cluster of the last one | all others), *new* last.
+
+        Args:
+            task: What there is to explain.
+            rng: Draws.
+            beta: Inverse temperature.
+            automaton: Whether the successors move too.
+        """
+        trials = self.trials(task)
+        if automaton:
+            kernels.transition_moves(trials, self.clusters, 0, beta, rng)
+        votes = np.zeros(len(self.clusters.n_trials) + 1)
+        kernels.sweep(trials, self._order(rng), self.clusters, task.log_new, beta, rng, votes)
+        return votes
+
+    def slip_sweep(self, task: Task, rng: np.random.Generator, *, thorough: bool) -> FloatArray:
+        """Move the slips of trials, and the last one by forward filtering; return what ``sweep`` does.
+
+        Args:
+            task: What there is to explain.
+            rng: Draws.
+            thorough: Whether trials other than the last one move.
+        """
+        trials, done = self.trials(task), task.recording.actions
+        log_odds = float(np.log(self.slip) - np.log1p(-self.slip))
+        order = self._order(rng)
+        if thorough:
+            for trial in order[:-1].tolist():
+                slip_kernels.slip_moves(trials, trial, self.clusters, done[trial], log_odds, task.log_new, 1, rng)
+        votes = np.zeros(len(self.clusters.n_trials) + 1)
+        last = int(order[-1])
+        slip_kernels.path_move(trials, last, self.clusters, done[last], log_odds, task.log_new, rng, votes)
+        self._estimate_slip(task)
+        return votes
+
+    def log_joint(self, task: Task) -> float:
+        """Return ln p(partition, starts, slips, all looks | structure) + ln p(structure), up to a constant."""
+        n_trials, n_objects = len(self.clusters.owner), int(np.count_nonzero(self.clusters.n_trials))
+        total = self.log_prior + self._learn_again(task) + float(task.log_partition[n_objects])
+        # The first trial of an object may begin anywhere: it only gives its states their names.
+        total -= (n_trials - n_objects) * float(np.log(self.n_states))
+        n_slips, n_actions = self._slips(task)
+        return total + n_slips * float(np.log(self.slip)) + (n_actions - n_slips) * float(np.log1p(-self.slip))
+
+    def objects(self, names: IntArray, task: Task) -> IntArray:
+        """Return the name that most looks of each cluster have, −1 of a cluster without, shape [C].
+
+        Args:
+            names: Number of the name of each trial, −1 of one without, shape [N].
+            task: For the numbers of looks.
+        """
+        named = (names >= 0) & (self.clusters.owner >= 0)
+        n_names = int(names.max(initial=-1)) + 1
+        result = np.full(len(self.clusters.n_trials), -1)
+        if n_names:
+            looks = np.zeros((len(result), n_names))
+            np.add.at(looks, (self.clusters.owner[named], names[named]), task.recording.lengths[named])
+            result = np.where(looks.any(axis=1), looks.argmax(axis=1), -1)
+        return result
+
+    def tally(self, task: Task, weight: float, right: FloatArray, truth: FloatArray) -> None:
+        """Add weight · p(label is right), and of symbol and label, to what is counted over all chains."""
+        labels = task.recording.labels
+        kernels.right_probabilities(self.trials(task), self.clusters, labels, weight, right, truth)
+
+    def _learn_again(self, task: Task) -> float:
+        path = np.zeros(task.looks.shape[1], dtype=np.int64)
+        return float(kernels.learn_all_again(self.trials(task), self.clusters, -1, path))
+
+    def _order(self, rng: np.random.Generator) -> IntArray:
+        n_others = len(self.clusters.owner) - 1
+        order: IntArray = np.append(rng.permutation(n_others), n_others)
+        return order
+
+    def _slips(self, task: Task) -> tuple[int, int]:
+        there = np.arange(self.actions.shape[1]) < task.recording.lengths[:, None] - 1
+        stay = self.clusters.successors.shape[1] - 1
+        return int(np.count_nonzero((self.actions == stay) & there)), int(np.count_nonzero(there))
+
+    def _estimate_slip(self, task: Task) -> None:
+        n_slips, n_actions = self._slips(task)
+        self.slip = (n_slips + SLIP_PRIOR[0]) / (n_actions + sum(SLIP_PRIOR))

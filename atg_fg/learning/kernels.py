@@ -1,0 +1,397 @@
+"""The loops that sampling spends its time in, compiled by Numba.
+
+All of them work on one form of structure: S states, a table of successors an action, and the register that each state
+shows in each slot. A *cluster* holds the trials of one object; its table [R, V] is what they say of its registers,
+``prior · Π likelihoods``, normalised. Randomness is drawn from the generator that is handed in.
+
+This module is loaded where something is sampled, and not before: it takes longer to load than all of the rest.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeVar
+
+import numba
+import numpy as np
+
+from atg_fg.core.patterns import FloatArray, IntArray
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+#: Products are put aside as a logarithm before they leave the range of floating-point numbers.
+_SMALL = 1e-120
+
+
+def compiled(function: _Function) -> _Function:
+    """Have Numba compile a function, and keep what it made beside the source."""
+    result: _Function = numba.njit(cache=True)(function)
+    return result
+
+
+class TrialArrays(NamedTuple):
+    """N trials side by side.
+
+    Attributes:
+        looks: Likelihood of each symbol in each slot at each look, shape [N, T, J, V].
+        actions: Index of the action after each look, shape [N, T]; that of *stay* is the last row of successors.
+        lengths: Number of looks, shape [N].
+    """
+
+    looks: FloatArray
+    actions: IntArray
+    lengths: IntArray
+
+
+class Clusters(NamedTuple):
+    """What one chain believes: which trials are of one object, and where each of them began.
+
+    Attributes:
+        successors: Of each automaton, the shared one first, shape [G, A + 1, S]; the last action is to stay.
+        registers: The register in each slot in each state, shape [S, J].
+        automaton: Which one each cluster follows, shape [C].
+        tables: p(symbol in a register | its trials), shape [C, R, V].
+        n_trials: Trials of each cluster, shape [C]; 0 of one that is free.
+        owner: Cluster of each trial, −1 of one that is taken out, shape [N].
+        start: First state of each trial, shape [N].
+        prior: Of the symbols, shape [V].
+    """
+
+    successors: IntArray
+    registers: IntArray
+    automaton: IntArray
+    tables: FloatArray
+    n_trials: IntArray
+    owner: IntArray
+    start: IntArray
+    prior: FloatArray
+
+
+@compiled
+def draw(weights: FloatArray, rng: np.random.Generator) -> int:
+    """Return an index drawn by weights that need not be normalised."""
+    rest = rng.random() * weights.sum()
+    chosen = 0
+    for index in range(len(weights)):
+        if weights[index] > 0:
+            chosen = index
+            rest -= weights[index]
+            if rest <= 0:
+                break
+    return chosen
+
+
+@compiled
+def draw_by_logarithm(logarithms: FloatArray, beta: float, rng: np.random.Generator) -> int:
+    """Return an index drawn by exp(β · logarithm)."""
+    return draw(np.exp(beta * (logarithms - logarithms.max())), rng)
+
+
+@compiled
+def walk(successors: IntArray, actions: IntArray, length: int, start: int, path: IntArray) -> None:
+    """Fill in the states that actions lead through."""
+    path[0] = start
+    for time in range(length - 1):
+        path[time + 1] = successors[actions[time], path[time]]
+
+
+@compiled
+def look_up(
+    looks: FloatArray, length: int, path: IntArray, registers: IntArray, local: FloatArray, visited: IntArray
+) -> tuple[int, float]:
+    """Fill in the likelihood Π e(c) of each register that a path shows; return how many, and ln of the scale."""
+    n_visited, log_scale = 0, 0.0
+    n_symbols = local.shape[1]
+    for time in range(length):
+        for slot in range(registers.shape[1]):
+            register = registers[path[time], slot]
+            is_new = True
+            for other in range(n_visited):
+                if visited[other] == register:
+                    is_new = False
+                    break
+            if is_new:
+                visited[n_visited] = register
+                n_visited += 1
+                for symbol in range(n_symbols):
+                    local[register, symbol] = looks[time, slot, symbol]
+            else:
+                peak = 0.0
+                for symbol in range(n_symbols):
+                    local[register, symbol] *= looks[time, slot, symbol]
+                    peak = max(peak, local[register, symbol])
+                if 0.0 < peak < _SMALL:
+                    for symbol in range(n_symbols):
+                        local[register, symbol] /= peak
+                    log_scale += np.log(peak)
+    return n_visited, log_scale
+
+
+@compiled
+def log_product(table: FloatArray, local: FloatArray, visited: IntArray, n_visited: int) -> float:
+    """Return ln Π_r Σ_c table(r, c) · local(r, c) over the registers that were visited."""
+    product, logarithm = 1.0, 0.0
+    for index in range(n_visited):
+        register = visited[index]
+        total = 0.0
+        for symbol in range(local.shape[1]):
+            total += table[register, symbol] * local[register, symbol]
+        product *= total
+        if product < _SMALL:
+            logarithm += np.log(product) if product > 0 else -1e6
+            product = 1.0
+    return float(logarithm + np.log(product))
+
+
+@compiled
+def fresh_log_evidence(
+    trials: TrialArrays, successors: IntArray, registers: IntArray, n_registers: int, prior: FloatArray
+) -> FloatArray:
+    """Return ln p(trial | a fresh object) = ln 1/S Σ_start Π_r Σ_c prior(c) Π_looks e(c) of each, shape [N]."""
+    n_trials, n_states = len(trials.lengths), len(registers)
+    table = np.empty((n_registers, len(prior)))
+    for register in range(n_registers):
+        table[register] = prior
+    local, visited = np.empty_like(table), np.empty(n_registers, np.int64)
+    path, logarithms = np.empty(trials.looks.shape[1], np.int64), np.empty(n_states)
+    result = np.empty(n_trials)
+    for trial in range(n_trials):
+        length = trials.lengths[trial]
+        for start in range(n_states):
+            walk(successors, trials.actions[trial], length, start, path)
+            n_visited, scale = look_up(trials.looks[trial], length, path, registers, local, visited)
+            logarithms[start] = scale + log_product(table, local, visited, n_visited)
+        peak = logarithms.max()
+        result[trial] = peak + np.log(np.exp(logarithms - peak).sum() / n_states)
+    return result
+
+
+@compiled
+def take_in(trials: TrialArrays, trial: int, clusters: Clusters, cluster: int, path: IntArray) -> float:
+    """Multiply a trial into the table of a cluster; return ln p(trial | what the cluster knew, its start)."""
+    table, registers = clusters.tables[cluster], clusters.registers
+    successors = clusters.successors[clusters.automaton[cluster]]
+    walk(successors, trials.actions[trial], trials.lengths[trial], clusters.start[trial], path)
+    product, logarithm = 1.0, 0.0
+    for time in range(trials.lengths[trial]):
+        for slot in range(registers.shape[1]):
+            register = registers[path[time], slot]
+            total = 0.0
+            for symbol in range(table.shape[1]):
+                table[register, symbol] *= trials.looks[trial, time, slot, symbol]
+                total += table[register, symbol]
+            if total > 0:
+                for symbol in range(table.shape[1]):
+                    table[register, symbol] /= total
+            product *= total
+            if product < _SMALL:
+                logarithm += np.log(product) if product > 0 else -1e6
+                product = 1.0
+    return float(logarithm + np.log(product))
+
+
+@compiled
+def forget(clusters: Clusters, cluster: int) -> None:
+    """Set the table of a cluster back to the prior."""
+    for register in range(clusters.tables.shape[1]):
+        clusters.tables[cluster, register] = clusters.prior
+
+
+@compiled
+def learn_again(trials: TrialArrays, clusters: Clusters, cluster: int, path: IntArray) -> float:
+    """Make the table of a cluster anew from its trials; return ln of their evidence, given their starts."""
+    forget(clusters, cluster)
+    total = 0.0
+    for trial in range(len(trials.lengths)):
+        if clusters.owner[trial] == cluster:
+            total += take_in(trials, trial, clusters, cluster, path)
+    return total
+
+
+@compiled
+def learn_all_again(trials: TrialArrays, clusters: Clusters, automaton: int, path: IntArray) -> float:
+    """Make the tables of all clusters that follow an automaton anew, of all if it is −1; return ln of the evidence."""
+    for cluster in range(len(clusters.n_trials)):
+        if clusters.n_trials[cluster] > 0 and (automaton < 0 or clusters.automaton[cluster] == automaton):
+            forget(clusters, cluster)
+    total = 0.0
+    for trial in range(len(trials.lengths)):
+        cluster = clusters.owner[trial]
+        if cluster >= 0 and (automaton < 0 or clusters.automaton[cluster] == automaton):
+            total += take_in(trials, trial, clusters, cluster, path)
+    return total
+
+
+@compiled
+def transition_moves(
+    trials: TrialArrays, clusters: Clusters, automaton: int, beta: float, rng: np.random.Generator
+) -> None:
+    """Draw each entry of an automaton's successors given all else: objects, starts, and the other entries."""
+    successors = clusters.successors[automaton]
+    n_actions, n_states = successors.shape[0] - 1, successors.shape[1]
+    path, scores = np.empty(trials.looks.shape[1], np.int64), np.empty(n_states)
+    for entry in rng.permutation(n_actions * n_states):
+        action, state = entry // n_states, entry % n_states
+        for successor in range(n_states):
+            successors[action, state] = successor
+            scores[successor] = learn_all_again(trials, clusters, automaton, path)
+        successors[action, state] = draw_by_logarithm(scores, beta, rng)
+    learn_all_again(trials, clusters, automaton, path)
+
+
+@compiled
+def take_out(trials: TrialArrays, trial: int, clusters: Clusters, path: IntArray) -> tuple[int, int]:
+    """Take a trial out of its cluster; return a free cluster, forgotten, and the number of clusters left."""
+    cluster = clusters.owner[trial]
+    if cluster >= 0:
+        clusters.n_trials[cluster] -= 1
+        clusters.owner[trial] = -1
+        if clusters.n_trials[cluster] > 0:
+            learn_again(trials, clusters, cluster, path)
+    n_clusters, free = 0, -1
+    for other in range(len(clusters.n_trials)):
+        if clusters.n_trials[other] > 0:
+            n_clusters += 1
+        elif free < 0:
+            free = other
+    clusters.automaton[free] = 0
+    forget(clusters, free)
+    return free, n_clusters
+
+
+@compiled
+def trial_weights(
+    trials: TrialArrays, trial: int, clusters: Clusters, free: int, log_new: float, weights: FloatArray
+) -> None:
+    """Fill in ln p(trial, start | cluster) up to the prior of starts, shape [C, S]; −∞ of clusters that are not there.
+
+    Args:
+        trials: All of them.
+        trial: One that is taken out.
+        clusters: Of the others.
+        free: The cluster that stands for a new object.
+        log_new: Ln of its weight beside that of each known object.
+        weights: To be filled in.
+    """
+    n_states = weights.shape[1]
+    local, visited = np.empty(clusters.tables.shape[1:]), np.empty(clusters.tables.shape[1], np.int64)
+    path, length = np.empty(trials.looks.shape[1], np.int64), trials.lengths[trial]
+    weights[:] = -np.inf
+    # All that follow the shared automaton go the same way from a start, the others each their own.
+    for start in range(n_states):
+        walk(clusters.successors[0], trials.actions[trial], length, start, path)
+        n_visited, scale = look_up(trials.looks[trial], length, path, clusters.registers, local, visited)
+        for cluster in range(len(clusters.n_trials)):
+            if clusters.automaton[cluster] == 0 and (clusters.n_trials[cluster] > 0 or cluster == free):
+                weights[cluster, start] = scale + log_product(clusters.tables[cluster], local, visited, n_visited)
+    for cluster in range(len(clusters.n_trials)):
+        if clusters.automaton[cluster] > 0 and clusters.n_trials[cluster] > 0:
+            for start in range(n_states):
+                successors = clusters.successors[clusters.automaton[cluster]]
+                walk(successors, trials.actions[trial], length, start, path)
+                n_visited, scale = look_up(trials.looks[trial], length, path, clusters.registers, local, visited)
+                weights[cluster, start] = scale + log_product(clusters.tables[cluster], local, visited, n_visited)
+    weights[free] += log_new
+
+
+@compiled
+def log_total(logarithms: FloatArray) -> float:
+    """Return ln Σ exp of a table, of which −∞ stands for zero."""
+    peak = logarithms.max()
+    return float(peak + np.log(np.exp(logarithms - peak).sum())) if peak > -np.inf else float(peak)
+
+
+@compiled
+def trial_move(
+    trials: TrialArrays,
+    trial: int,
+    clusters: Clusters,
+    log_new: FloatArray,
+    beta: float,
+    rng: np.random.Generator,
+    votes: FloatArray,
+) -> None:
+    """Draw the object and the start of a trial jointly, given all other trials, at inverse temperature β.
+
+    Args:
+        trials: All of them.
+        trial: Which one moves.
+        clusters: Changed in place.
+        log_new: Ln of the weight of a new object beside K known ones, shape [C + 1], by K.
+        beta: Inverse temperature.
+        rng: Draws.
+        votes: p(cluster | the others), *new* last, is added to it, shape [C + 1]; of length 0 if it is not asked for.
+    """
+    path = np.empty(trials.looks.shape[1], np.int64)
+    free, n_clusters = take_out(trials, trial, clusters, path)
+    weights = np.empty((len(clusters.n_trials), len(clusters.registers)))
+    trial_weights(trials, trial, clusters, free, log_new[n_clusters], weights)
+    if len(votes) > 0:
+        count_votes(weights, free, votes)
+    drawn = draw_by_logarithm(weights.ravel(), beta, rng)
+    put_in(trials, trial, clusters, drawn // weights.shape[1], drawn % weights.shape[1], path)
+
+
+@compiled
+def count_votes(weights: FloatArray, free: int, votes: FloatArray) -> None:
+    """Add p(cluster), summed over the second axis of logarithms, to votes, *new* last."""
+    total = log_total(weights.ravel())
+    for cluster in range(len(weights)):
+        share = np.exp(weights[cluster] - total).sum()
+        votes[len(weights) if cluster == free else cluster] += share
+
+
+@compiled
+def put_in(trials: TrialArrays, trial: int, clusters: Clusters, cluster: int, start: int, path: IntArray) -> None:
+    """Put a trial that is taken out into a cluster."""
+    clusters.owner[trial], clusters.start[trial] = cluster, start
+    clusters.n_trials[cluster] += 1
+    take_in(trials, trial, clusters, cluster, path)
+
+
+@compiled
+def sweep(
+    trials: TrialArrays,
+    order: IntArray,
+    clusters: Clusters,
+    log_new: FloatArray,
+    beta: float,
+    rng: np.random.Generator,
+    votes: FloatArray,
+) -> None:
+    """Move trials in this order; votes are counted for the last of them."""
+    nobody = np.zeros(0)
+    for position in range(len(order)):
+        is_last = position == len(order) - 1
+        trial_move(trials, order[position], clusters, log_new, beta, rng, votes if is_last else nobody)
+
+
+@compiled
+def right_probabilities(
+    trials: TrialArrays, clusters: Clusters, labels: IntArray, weight: float, right: FloatArray, truth: FloatArray
+) -> None:
+    """Add weight · p(symbol in the slot | all trials) of each look to what is counted.
+
+    Args:
+        trials: All of them.
+        clusters: With the tables of all trials.
+        labels: Symbol seen in each slot at each look, −1 where none was, shape [N, T, J].
+        weight: Of this chain.
+        right: p(the label is right) of each label is added to it, shape [N, T, J].
+        truth: p(truth, label) of all labels is added to it, shape [V, V].
+    """
+    path = np.empty(trials.looks.shape[1], np.int64)
+    for trial in range(len(trials.lengths)):
+        cluster = clusters.owner[trial]
+        if cluster < 0:
+            continue
+        successors = clusters.successors[clusters.automaton[cluster]]
+        walk(successors, trials.actions[trial], trials.lengths[trial], clusters.start[trial], path)
+        for time in range(trials.lengths[trial]):
+            for slot in range(labels.shape[2]):
+                label = labels[trial, time, slot]
+                if label >= 0:
+                    register = clusters.registers[path[time], slot]
+                    right[trial, time, slot] += weight * clusters.tables[cluster, register, label]
+                    for symbol in range(len(truth)):
+                        truth[symbol, label] += weight * clusters.tables[cluster, register, symbol]

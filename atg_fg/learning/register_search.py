@@ -1,0 +1,68 @@
+"""Search for register maps that explain trials: annealed Gibbs sampling on the exact evidence of fresh objects."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Final
+
+import numpy as np
+
+from atg_fg.core.patterns import FloatArray
+from atg_fg.learning import map_kernels
+from atg_fg.learning.kernels import TrialArrays
+from atg_fg.learning.shared_structure import SharedStructure, log_map_priors
+
+#: Hidden registers of the largest structure looked at.
+MAX_HIDDEN: Final = 6
+#: Sweeps of a chain, and how hot it begins.
+N_SWEEPS: Final = 40
+HOTTEST: Final = 0.15
+#: The same of a chain that goes on among all maps from the best permutations, which copy sources too.
+N_COPYING_SWEEPS: Final = 12
+HOTTEST_COPYING: Final = 0.5
+#: Trials that are searched on, the newest ones.
+N_TRIALS: Final = 24
+
+
+def search_registers(
+    trials: TrialArrays,
+    plain: FloatArray,
+    n_slots: int,
+    n_actions: int,
+    n_chains: int,
+    rng: np.random.Generator,
+) -> list[SharedStructure]:
+    """Return the best structure of each chain, in canonical form, without repeats.
+
+    Args:
+        trials: As those of fresh objects, at least one.
+        plain: ln p(trial | it follows no structure), shape [N].
+        n_slots: J.
+        n_actions: A.
+        n_chains: For each number of registers.
+        rng: Draws.
+    """
+    n_symbols = trials.looks.shape[-1]
+    prior = np.full(n_symbols, 1.0 / n_symbols)
+    newest = slice(max(len(plain) - N_TRIALS, 0), None)
+    window = TrialArrays(trials.looks[newest], trials.actions[newest], trials.lengths[newest])
+    found: dict[SharedStructure, float] = {}
+    for n_registers in range(n_slots, n_slots + MAX_HIDDEN + 1):
+        best, best_sources = -np.inf, np.zeros((0, 0), dtype=np.int64)
+        for _ in range(n_chains):
+            sources = np.array([rng.permutation(n_registers) for _ in range(n_actions)])
+            coldness = np.geomspace(HOTTEST, 1.0, N_SWEEPS)
+            score = map_kernels.anneal_maps(window, plain[newest], sources, n_slots, prior, coldness, False, 0.0, rng)
+            found[_structure(n_slots, sources)] = score
+            if score > best:
+                best, best_sources = score, sources
+        permutation, other = log_map_priors(n_registers)
+        sources, coldness = best_sources.copy(), np.geomspace(HOTTEST_COPYING, 1.0, N_COPYING_SWEEPS)
+        cost = permutation - other
+        map_kernels.anneal_maps(window, plain[newest], sources, n_slots, prior, coldness, True, cost, rng)
+        found.setdefault(_structure(n_slots, sources), 0.0)
+    return list(found)
+
+
+def _structure(n_slots: int, sources: Sequence[Sequence[int]] | np.ndarray) -> SharedStructure:
+    return SharedStructure(n_slots, tuple(tuple(map(int, each)) for each in sources)).canonical()

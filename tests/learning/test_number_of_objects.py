@@ -1,0 +1,37 @@
+import itertools
+
+import numpy as np
+import pytest
+
+from atg_fg.learning.number_of_objects import log_new_weights, log_partition
+
+
+def stirling(n, k):
+    """Number of partitions of n trials into k objects."""
+    owners = {
+        tuple(sorted(map(tuple, [[t for t in range(n) if o[t] == i] for i in range(n)])))
+        for o in itertools.product(range(n), repeat=n)
+    }
+    return sum(sum(1 for cluster in each if cluster) == k for each in owners)
+
+
+@pytest.mark.parametrize("n_trials", [1, 2, 3, 4])
+def test_partitions_of_trials_into_objects_are_a_distribution(n_trials):
+    log_p = log_partition(6, n_trials, n_trials)
+    total = sum(stirling(n_trials, k) * np.exp(log_p[k]) for k in range(1, n_trials + 1))
+    # One object more than there are has a small weight, so the total is a little above one.
+    assert 1.0 <= total < 1.01
+
+
+def test_a_new_object_weighs_as_much_as_there_are_objects_left():
+    assert np.exp(log_new_weights(100, 60, 50))[45] == pytest.approx(55, rel=0.1)
+
+
+def test_being_told_of_too_many_objects_is_found_out():
+    told = np.exp(log_new_weights(30, 48, 12))[8]
+    assert told < 1.0  # all eight objects were met again and again; thirty would have shown more
+    assert np.exp(log_new_weights(30, 9, 12))[8] > 10.0
+
+
+def test_large_numbers_of_objects_cost_no_more():
+    assert np.isfinite(log_partition(2**53, 5, 8)).all()
