@@ -7,6 +7,7 @@ from typing import Final, TypeAlias
 import numpy as np
 
 from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.patterns import FloatArray
 
 FACES: Final = ("front", "back", "left", "right", "top", "bottom")
 
@@ -55,6 +56,25 @@ def _closure() -> tuple[tuple[Orientation, ...], tuple[tuple[int, ...], ...]]:
 
 #: All 24 orientations, and ``SUCCESSORS[orientation][action]``, the orientation an action leads to.
 ORIENTATIONS, SUCCESSORS = _closure()
+
+
+#: Outward normal of each face in the order of ``FACES`` (x away from the robot, y to its left, z up), shape [6, 3].
+FACE_NORMALS: Final[FloatArray] = np.array(
+    [[-1, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], dtype=np.float64
+)
+
+
+def rotation_of(orientation: int) -> FloatArray:
+    """Return the rotation matrix from the cube's frame to the world's in one of the 24 orientations, shape [3, 3]."""
+    faces = ORIENTATIONS[orientation]
+    # The face now at a place has its normal where that place points; three places make a basis.
+    return np.asarray(sum(np.outer(FACE_NORMALS[place], FACE_NORMALS[faces[place]]) for place in (BACK, LEFT, TOP)))
+
+
+#: How each action turns the cube.
+ACTION_ROTATIONS: Final[dict[str, FloatArray]] = {
+    name: rotation_of(successor) for name, successor in zip(ACTION_SOURCES, SUCCESSORS[0], strict=True)
+}
 
 
 def shown_pattern(cube: Cube, orientation: int) -> tuple[int, int]:

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from atg_fg.core.patterns import FloatArray
 from atg_fg.senses import tags
-from atg_fg.worlds.arcube import BACK, LEFT, N_TAGS, ORIENTATIONS, TOP, Cube
+from atg_fg.worlds.arcube import FACE_NORMALS, N_TAGS, ORIENTATIONS, Cube, rotation_of
 
 CUBE_SIZE: Final = 0.28  # m
 
@@ -31,12 +31,6 @@ CUBE_CENTRE: Final[FloatArray] = np.array([0.42, 0.0, 0.30])
 
 #: 5×5 tags: the first twelve differ in at least 10 bits, those of the 4×4 dictionary in 5.
 TAG_DICTIONARY: Final = "5X5_50"
-
-
-#: Outward normal of each face in the order of ``atg_fg.worlds.arcube.FACES``, shape [6, 3].
-FACE_NORMALS: Final[FloatArray] = np.array(
-    [[-1, 0, 0], [1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]], dtype=np.float64
-)
 
 
 #: Which way is up on the tag of each face, shape [6, 3].
@@ -60,13 +54,6 @@ def face_image(symbol: int) -> NDArray[np.uint8]:
     margin = (_FACE_PIXELS - _TAG_PIXELS) // 2
     face[margin:-margin, margin:-margin] = tag_image(symbol)[:, :, None]
     return face
-
-
-def rotation_of(orientation: int) -> FloatArray:
-    """Return the rotation matrix from the cube's frame to the world's in one of the 24 orientations."""
-    faces = ORIENTATIONS[orientation]
-    # The face now at a place has its normal where that place points; three places make a basis.
-    return np.asarray(sum(np.outer(FACE_NORMALS[place], FACE_NORMALS[faces[place]]) for place in (BACK, LEFT, TOP)))
 
 
 #: Of every orientation, shape [24, 3, 3].

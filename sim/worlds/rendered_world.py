@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.patterns import FloatArray
 from atg_fg.senses.tags import DetectedTag
-from atg_fg.worlds.arcube import Cube
+from atg_fg.worlds.arcube import Cube, rotation_of
 from atg_fg.worlds.arcube_world import ARcubeWorld
-from sim.bodies.cube import CUBE_CENTRE, CUBE_SIZE, CubeBody, rotation_of
+from sim.bodies.cube import CUBE_CENTRE, CUBE_SIZE, CubeBody
 from sim.vision.camera import Camera
 from sim.vision.image_noise import Imaging, at_least_zero
 from sim.vision.tag_detection import detect_markers, detected_symbols, draw_detections

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from atg_fg.core.patterns import FloatArray
 from atg_fg.display.rerun_viewer import import_rerun
-from atg_fg.worlds.arcube import Cube
-from sim.bodies.cube import CUBE_SIZE, FACE_NORMALS, FACE_UPS, face_image, quaternion_of
+from atg_fg.worlds.arcube import FACE_NORMALS, Cube
+from sim.bodies.cube import CUBE_SIZE, FACE_UPS, face_image, quaternion_of
 from sim.vision.camera import Camera
 
 #: Triangles of a square whose corners go round.

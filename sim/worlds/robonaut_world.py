@@ -15,9 +15,9 @@ from numpy.typing import NDArray
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.patterns import IntArray
 from atg_fg.senses.tags import DetectedTag
-from atg_fg.worlds.arcube import ACTION_SOURCES, SUCCESSORS, Cube, shown_pattern
+from atg_fg.worlds.arcube import ACTION_SOURCES, SUCCESSORS, Cube, rotation_of, shown_pattern
 from atg_fg.worlds.arcube_world import ARcubeWorld
-from sim.bodies.cube import CUBE_CENTRE, nearest_orientation, rotation_of
+from sim.bodies.cube import CUBE_CENTRE, nearest_orientation
 from sim.manipulation.execution import Manipulator, OutOfReachError
 from sim.manipulation.impedance_control import ArmController
 from sim.vision.camera import Camera

@@ -11,9 +11,9 @@ from gymnasium import spaces
 
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.patterns import IntArray
-from atg_fg.worlds.arcube import ACTION_SOURCES, ORIENTATIONS, Cube
+from atg_fg.worlds.arcube import ACTION_SOURCES, ORIENTATIONS, Cube, rotation_of
 from atg_fg.worlds.stations import check_one_a_station, drawn_objects
-from sim.bodies.cube import CUBE_CENTRE, CUBE_SIZE, nearest_orientation, rotation_of
+from sim.bodies.cube import CUBE_CENTRE, CUBE_SIZE, nearest_orientation
 from sim.vision.camera import Camera
 from sim.worlds.film import observer_of
 from sim.worlds.robonaut_world import RobonautARcubeWorld

@@ -3,8 +3,8 @@ import numpy as np
 import pytest
 
 from atg_fg.senses.tags import DICTIONARIES
-from atg_fg.worlds.arcube import ACTION_SOURCES, BACK, LEFT, ORIENTATIONS, SUCCESSORS, TOP
-from sim.bodies.cube import FACE_NORMALS, FACE_UPS, TAG_DICTIONARY, face_image, quaternion_of, rotation_of, tag_image
+from atg_fg.worlds.arcube import ACTION_SOURCES, BACK, FACE_NORMALS, LEFT, ORIENTATIONS, SUCCESSORS, TOP, rotation_of
+from sim.bodies.cube import FACE_UPS, TAG_DICTIONARY, face_image, quaternion_of, tag_image
 
 QUARTER = {
     # The top comes to the front (−x): about −y. The left (+y) comes to the front: about +z. The right: about −z.

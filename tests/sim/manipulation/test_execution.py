@@ -1,7 +1,8 @@
 import numpy as np
 import pytest
 
-from sim.bodies.cube import CUBE_CENTRE, rotation_of
+from atg_fg.worlds.arcube import rotation_of
+from sim.bodies.cube import CUBE_CENTRE
 from sim.manipulation.execution import Manipulator, OutOfReachError
 from sim.manipulation.impedance_control import ArmController
 from sim.vision.cube_pose import CubePose

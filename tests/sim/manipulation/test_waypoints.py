@@ -6,8 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from atg_fg.worlds.arcube import ACTION_SOURCES, SUCCESSORS
-from sim.bodies.cube import CUBE_CENTRE, nearest_orientation, rotation_of
+from atg_fg.worlds.arcube import ACTION_SOURCES, SUCCESSORS, rotation_of
+from sim.bodies.cube import CUBE_CENTRE, nearest_orientation
 from sim.bodies.robot import HOME_POSTURE
 from sim.manipulation import waypoints as plans
 from sim.manipulation.inverse_kinematics import solve

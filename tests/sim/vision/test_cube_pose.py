@@ -4,7 +4,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from atg_fg.senses.tags import DetectedTag, TagPose
-from sim.bodies.cube import CUBE_CENTRE, FACE_NORMALS, FACE_UPS
+from atg_fg.worlds.arcube import FACE_NORMALS
+from sim.bodies.cube import CUBE_CENTRE, FACE_UPS
 from sim.manipulation.waypoints import about_vertical
 from sim.vision.cube_pose import cube_pose
 

@@ -5,7 +5,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from atg_fg.core.errors import InvalidInputError
-from sim.bodies.cube import CUBE_CENTRE, CubeBody, rotation_of
+from atg_fg.worlds.arcube import rotation_of
+from sim.bodies.cube import CUBE_CENTRE, CubeBody
 from sim.vision.camera import Camera, Light
 from sim.vision.image_noise import Imaging, at_least_zero
 

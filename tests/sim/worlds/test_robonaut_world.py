@@ -15,10 +15,10 @@ from atg_fg.experiments.table1 import TestPlan, run_test
 from atg_fg.experiments.trial import check_world, run_trial
 from atg_fg.policies import EntropyPolicy
 from atg_fg.storage.presets import preset
-from atg_fg.worlds.arcube import SUCCESSORS
+from atg_fg.worlds.arcube import SUCCESSORS, rotation_of
 from atg_fg.worlds.base import MISSING
 from atg_fg.worlds.registry import make_world
-from sim.bodies.cube import CUBE_CENTRE, rotation_of
+from sim.bodies.cube import CUBE_CENTRE
 from sim.vision.cube_pose import CubePose
 from sim.worlds.domain_randomization import Circumstances, Condition
 from sim.worlds.robonaut_world import LARGEST_OFFSET, RobonautARcubeWorld
