@@ -17,7 +17,7 @@ setup: $(READY)  ## Install everything into .venv
 $(READY): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1'
-	$(BIN)/python -m pip install --quiet --editable '.[sim,viz,report,viewer,notebooks]' \
+	$(BIN)/python -m pip install --quiet --editable '.[sim,vision,viz,print,report,viewer,notebooks]' \
 		--group test --group dev --group docs
 	touch $@
 

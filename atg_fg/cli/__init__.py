@@ -26,6 +26,11 @@ COMMANDS: Final = {
         "explain": "atg_fg.cli.explain:explain",
         "uai": "atg_fg.cli.uai:app",
     },
+    "Camera": {
+        "look": "atg_fg.cli.look:look",
+        "camera": "atg_fg.cli.camera:app",
+        "print": "atg_fg.cli.printing:app",
+    },
     "Memory": {
         "memory": "atg_fg.cli.memory:app",
         "structure": "atg_fg.cli.structure:app",
