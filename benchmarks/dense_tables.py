@@ -61,7 +61,7 @@ def dense_model(memory: RobotMemory, parameters: ModelParameters) -> DenseModel:
     observation /= observation.sum(axis=-1, keepdims=True)
     return DenseModel(
         prior=model.prior,
-        initial=model.base,
+        initial=model.base_row,
         transition=np.stack([model.transition(action) for action in range(model.n_actions)]),
         observation=observation,
         there=there,

@@ -24,7 +24,7 @@ from atg_fg.core.patterns import Evidence, FloatArray, IntArray, PatternAlphabet
 from atg_fg.engines import begin_trial
 from atg_fg.engines.large_memory.engine import LargeMemory
 from atg_fg.experiments.engine_comparison import total_variation
-from atg_fg.inference.interface import Inference
+from atg_fg.inference.interface import Inference, TrialSetup
 from atg_fg.storage.compact_file import load_compact_memory, save_compact_memory
 from atg_fg.storage.presets import preset
 from atg_fg.worlds.arcube import ACTION_SOURCES
@@ -176,7 +176,7 @@ def fallbacks(preset_name: str, n_objects: int = 1_000, n_trials: int = 10) -> t
     alphabet = presented.memory.assumptions.alphabet
     fell_back, decisions, bound = 0, 0, 0.0
     for patterns, actions in presented.trials:
-        inference = LargeMemory(presented.memory, preset(preset_name), n_exact=0)
+        inference = LargeMemory(TrialSetup(presented.memory, preset(preset_name)), n_exact=0)
         for look, pattern in enumerate(patterns):
             if look:
                 inference.act(int(actions[look - 1]))

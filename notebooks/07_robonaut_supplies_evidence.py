@@ -29,6 +29,7 @@ from matplotlib.figure import Figure
 
 from atg_fg.core.assumptions import arcube_assumptions
 from atg_fg.core.memory import RobotMemory
+from atg_fg.core.patterns import MISSING
 from atg_fg.core.statistics import wilson_interval
 from atg_fg.display.figures import GREY, INK, PALETTE, figure_class, plot_style
 from atg_fg.display.trial_plots import plot_belief
@@ -37,7 +38,6 @@ from atg_fg.experiments.trial import run_trial
 from atg_fg.policies import make_policy
 from atg_fg.storage.presets import preset
 from atg_fg.worlds.arcube import ACTION_SOURCES, N_TAGS, make_arcubes
-from atg_fg.worlds.base import MISSING
 from atg_fg.worlds.registry import make_world
 
 cubes = make_arcubes(4, seed=0)

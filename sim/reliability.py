@@ -15,10 +15,9 @@ from typing import Any, Final
 import numpy as np
 
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.core.patterns import FloatArray
+from atg_fg.core.patterns import MISSING, FloatArray
 from atg_fg.core.statistics import wilson_interval
 from atg_fg.worlds.arcube import ACTION_SOURCES
-from atg_fg.worlds.base import MISSING
 from sim.worlds.domain_randomization import condition_named
 from sim.worlds.robonaut_world import RobonautARcubeWorld
 from sim.worlds.stations_world import RobonautTableWorld

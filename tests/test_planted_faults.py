@@ -46,8 +46,8 @@ FAULTS = [
     Fault(
         "mass of the collection node lost",
         "inference/recognition_model.py",
-        "self.base[:, COLLECTION] = n_unobserved / self.n_aspects",
-        "self.base[:, COLLECTION] = 0.0",
+        "self.base_row[:, COLLECTION] = n_unobserved / self.n_aspects",
+        "self.base_row[:, COLLECTION] = 0.0",
     ),
     Fault(
         "one unseen object too many",
@@ -70,8 +70,8 @@ FAULTS = [
     Fault(
         "patterns of known aspects expected of the collection node",
         "inference/recognition_model.py",
-        "(1.0 - delta) / np.maximum(self.n_unknown, 1.0)",
-        "(1.0 - delta) / n_patterns",
+        "(1.0 - delta) / np.maximum(self.n_lacking, 1.0)",
+        "(1.0 - delta) / self.n_patterns",
     ),
     Fault(
         "concentration left out of the edges' share",

@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeAlias
+from typing import Final, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -30,7 +30,11 @@ Pattern: TypeAlias = tuple[int, ...]
 Detection: TypeAlias = tuple[int | None, ...]
 
 
-MAX_PATTERNS = 100_000
+#: What stands in an array for the symbol of a slot where nothing was detected.
+MISSING: Final = -1
+
+
+MAX_PATTERNS: Final = 100_000
 
 
 @dataclass(frozen=True)

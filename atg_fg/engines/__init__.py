@@ -11,7 +11,7 @@ from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.engines.options import check_known
-from atg_fg.inference.interface import Inference
+from atg_fg.inference.interface import Inference, TrialSetup
 
 
 class Engines(Mapping[str, type[Inference]]):
@@ -97,6 +97,6 @@ def begin_trial(
     check_engine(engine, parameters)
     check_known(ENGINES[engine], engine, options)
     begin: Callable[..., Inference] = ENGINES[engine]
-    inference = begin(memory, parameters, prior, **options)
+    inference = begin(TrialSetup(memory, parameters, prior), **options)
     inference.options = options
     return inference

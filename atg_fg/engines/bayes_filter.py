@@ -1,7 +1,7 @@
 """The paper's own method: a Bayes filter, in NumPy.
 
-A transition row is ``stay · base`` plus a few counted edges (see ``atg_fg.inference.recognition_model``), so a step
-costs what the known edges cost.
+A transition row is ``prior_weight · base_row`` plus a few counted edges (``atg_fg.inference.recognition_model``), so a
+step costs what the known edges cost.
 """
 
 from __future__ import annotations

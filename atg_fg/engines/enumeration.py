@@ -8,11 +8,8 @@ import numpy as np
 
 from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.errors import TooLargeError
-from atg_fg.core.memory import RobotMemory
-from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, FloatArray
-from atg_fg.inference.interface import Inference
-from atg_fg.inference.recognition_model import Revelation
+from atg_fg.inference.interface import Inference, TrialSetup
 
 #: Most explanations (O, X_0:t) that are enumerated: 160 MB of weights.
 MAX_EXPLANATIONS = 20_000_000
@@ -30,9 +27,9 @@ class Enumeration(Inference):
     name: ClassVar[str] = "enumeration"
     exact: ClassVar[bool] = True
 
-    def __init__(self, memory: RobotMemory, parameters: ModelParameters, prior: IdentityBelief | None = None) -> None:
-        super().__init__(memory, parameters, prior)
-        self.weights: FloatArray = self.model.prior[:, None] * self.model.base
+    def __init__(self, setup: TrialSetup) -> None:
+        super().__init__(setup)
+        self.weights: FloatArray = self.model.prior[:, None] * self.model.base_row
         self._log_scale = 0.0
 
     def identity(self) -> IdentityBelief:
@@ -54,21 +51,21 @@ class Enumeration(Inference):
         by_object = weights.reshape(len(weights), -1).sum(axis=1) / weights.sum()
         return IdentityBelief(by_object[:-1], float(by_object[-1]), self.model.n_unseen)
 
-    def _update(self, likelihood: FloatArray) -> None:
-        weights = self._times_last(self.weights, likelihood)
+    def _look(self, evidence: Evidence) -> None:
+        weights = self._times_last(self.weights, self.model.likelihood(evidence))
         total = weights.sum()
         if not total > 0:
             raise self._impossible()
         self.weights = weights / total
         self._log_scale += float(np.log(total))
+        revelation = self._learn()
+        if revelation is not None:
+            padding = [(0, 0)] * (self.weights.ndim - 1) + [(0, self.model.n_states - self.weights.shape[-1])]
+            weights = np.moveaxis(np.pad(self.weights, padding), 0, -2)  # a copy with axes [W_0, …, H, W_t]
+            revelation.move(weights)
+            self.weights = np.moveaxis(weights, -2, 0)
 
-    def _divide(self, revelation: Revelation) -> None:
-        padding = [(0, 0)] * (self.weights.ndim - 1) + [(0, self.model.n_states - self.weights.shape[-1])]
-        weights = np.moveaxis(np.pad(self.weights, padding), 0, -2)  # a copy with axes [W_0, …, H, W_t]
-        revelation.move(weights)
-        self.weights = np.moveaxis(weights, -2, 0)
-
-    def _predict(self, action: int) -> None:
+    def _act(self, action: int) -> None:
         self.weights = self._extended(self.weights, action)
 
     def _extended(self, weights: FloatArray, action: int) -> FloatArray:

@@ -1,4 +1,4 @@
-"""What every inference engine offers, and the part that most of them share."""
+"""What engines share that carry a belief forward from look to look."""
 
 from __future__ import annotations
 
@@ -9,11 +9,9 @@ import numpy as np
 
 from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.log_math import log_of
-from atg_fg.core.memory import RobotMemory
-from atg_fg.core.parameters import ModelParameters
-from atg_fg.core.patterns import FloatArray
-from atg_fg.inference.interface import Inference
-from atg_fg.inference.recognition_model import Revelation, widened
+from atg_fg.core.patterns import Evidence, FloatArray
+from atg_fg.inference.interface import Inference, TrialSetup
+from atg_fg.inference.recognition_model import widened
 
 
 class _State(NamedTuple):
@@ -30,9 +28,9 @@ class FilterInference(Inference):
     back when the evidence turns, where a plain product would have underflowed to zero.
     """
 
-    def __init__(self, memory: RobotMemory, parameters: ModelParameters, prior: IdentityBelief | None = None) -> None:
-        super().__init__(memory, parameters, prior)
-        self._belief = _State(log_of(self.model.prior), self.model.base)
+    def __init__(self, setup: TrialSetup) -> None:
+        super().__init__(setup)
+        self._belief = _State(log_of(self.model.prior), self.model.base_row)
         self._log_evidence = 0.0
 
     def identity(self) -> IdentityBelief:
@@ -50,7 +48,15 @@ class FilterInference(Inference):
         """p(O, X_t | z_0:t, a_1:t), shape [H, W]."""
         return np.exp(self._belief.log_identity)[:, None] * self._belief.aspects
 
-    def _update(self, likelihood: FloatArray) -> None:
+    def _look(self, evidence: Evidence) -> None:
+        self._condition(self.model.likelihood(evidence))
+        revelation = self._learn()
+        if revelation is not None:
+            aspects = widened(self._belief.aspects, self.model.n_states)
+            revelation.move(aspects)
+            self._belief = _State(self._belief.log_identity, aspects)
+
+    def _condition(self, likelihood: FloatArray) -> None:
         joint = self._correct(self._belief.aspects, likelihood)
         given_object = joint.sum(axis=1)
         possible = given_object > 0
@@ -66,12 +72,7 @@ class FilterInference(Inference):
         self._belief = _State(log_joint - log_probability, aspects)
         self._log_evidence += log_probability
 
-    def _divide(self, revelation: Revelation) -> None:
-        aspects = widened(self._belief.aspects, self.model.n_states)
-        revelation.move(aspects)
-        self._belief = _State(self._belief.log_identity, aspects)
-
-    def _predict(self, action: int) -> None:
+    def _act(self, action: int) -> None:
         self._belief = _State(self._belief.log_identity, self._propagate(self._belief.aspects, action))
 
     @abstractmethod

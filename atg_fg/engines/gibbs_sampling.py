@@ -12,14 +12,12 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from atg_fg.core.belief import IdentityBelief
-from atg_fg.core.memory import RobotMemory
-from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.engines.options import whole_number
 from atg_fg.engines.sampling import drawn, split_r_hat
 from atg_fg.engines.whole_trial import Posterior, WholeTrialInference
 from atg_fg.inference.chain import Chain, ForwardPass, forward_pass
+from atg_fg.inference.interface import TrialSetup
 
 #: Objects that make up less of the samples than this are left out of the diagnostic.
 LEAST_SHARE = 0.01
@@ -47,9 +45,7 @@ class GibbsSampling(WholeTrialInference):
     aspects are the shares of paths drawn given the object.
 
     Args:
-        memory: The robot memory when the trial begins; it is not changed.
-        parameters: α, δ and whether to learn within the trial.
-        prior: p(O) when the trial begins; the memory's if not given.
+        setup: What the trial begins with.
         n_chains: Number of chains, begun at objects drawn from the proposal.
         n_sweeps: Sweeps of each chain that are kept.
         n_burn_in: Sweeps of each chain before these.
@@ -64,16 +60,14 @@ class GibbsSampling(WholeTrialInference):
 
     def __init__(
         self,
-        memory: RobotMemory,
-        parameters: ModelParameters,
-        prior: IdentityBelief | None = None,
+        setup: TrialSetup,
         *,
         n_chains: int = 8,
         n_sweeps: int = 1000,
         n_burn_in: int = 500,
         seed: int = 0,
     ) -> None:
-        super().__init__(memory, parameters, prior)
+        super().__init__(setup)
         self.n_chains = whole_number("n_chains", n_chains, 2)
         self.n_sweeps = whole_number("n_sweeps", n_sweeps, 4)
         self.n_burn_in = whole_number("n_burn_in", n_burn_in, 0)

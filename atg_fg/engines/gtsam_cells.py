@@ -6,7 +6,7 @@ by any action, are the states of one variable: the *cells*. X_t is eliminated fr
     p(cell) = Σ_x belief(x, cell) · weight(x, cell)
 
 in which states of X_t with the same weights are one state, numbered anew for each object and action. Which these are
-follows from the form of a transition row, ``stay · base`` plus a few counted edges (see
+follows from the form of a transition row, ``prior_weight · base_row`` plus a few counted edges (see
 ``atg_fg.inference.recognition_model``). As far as the base goes, they are the aspects from which the action was counted
 as often (``RowKinds``). In a cell that edges lead to, they are all aspects without such an edge (``EdgesInto``).
 """
@@ -44,33 +44,33 @@ def belief_factor(belief: FloatArray) -> Factor:
 
 
 class RowKinds:
-    """The states of X_t as far as a transition row is its base: one for each value of ``stay`` in (action, object).
+    """The states of X_t as far as a row is its base: one for each value of ``prior_weight`` in (action, object).
 
     Args:
-        stay: Share of the base in each row, shape [A, H, W].
+        prior_weight: Share of the base in each row, shape [A, H, W].
 
     Attributes:
-        stay: The same of each state, shape [S, A · H]; zero where an action and object has fewer.
+        prior_weight: The same of each state, shape [S, A · H]; zero where an action and object has fewer.
     """
 
-    def __init__(self, stay: FloatArray) -> None:
-        ascending = np.argsort(stay, axis=-1)
-        found = np.take_along_axis(stay, ascending, axis=-1)
-        ranks = np.zeros(stay.shape, dtype=np.int64)
+    def __init__(self, prior_weight: FloatArray) -> None:
+        ascending = np.argsort(prior_weight, axis=-1)
+        found = np.take_along_axis(prior_weight, ascending, axis=-1)
+        ranks = np.zeros(prior_weight.shape, dtype=np.int64)
         np.cumsum(found[..., 1:] != found[..., :-1], axis=-1, out=ranks[..., 1:])
         states = np.empty_like(ranks)
         np.put_along_axis(states, ascending, ranks, axis=-1)
-        n_cells = stay.shape[0] * stay.shape[1]
-        self._places = states * n_cells + np.arange(n_cells).reshape(*stay.shape[:2], 1)
-        self.stay = np.zeros((int(states.max()) + 1, n_cells))
-        self.stay.ravel()[self._places] = stay
+        n_cells = prior_weight.shape[0] * prior_weight.shape[1]
+        self._places = states * n_cells + np.arange(n_cells).reshape(*prior_weight.shape[:2], 1)
+        self.prior_weight = np.zeros((int(states.max()) + 1, n_cells))
+        self.prior_weight.ravel()[self._places] = prior_weight
 
     def belief(self, mass: FloatArray) -> Factor:
         """Return the belief ``mass`` [H, W] over these states in each cell (action, object), as a factor."""
         everywhere = np.broadcast_to(mass, self._places.shape)
-        # Sums, not differences of sums: what is left may be tiny and must stay exact.
-        lumped = np.bincount(self._places.ravel(), weights=everywhere.ravel(), minlength=self.stay.size)
-        return belief_factor(lumped.reshape(self.stay.shape).astype(np.float64))
+        # Sums, not differences of sums: what is left may be tiny and must prior_weight exact.
+        lumped = np.bincount(self._places.ravel(), weights=everywhere.ravel(), minlength=self.prior_weight.size)
+        return belief_factor(lumped.reshape(self.prior_weight.shape).astype(np.float64))
 
 
 class EdgesInto:

@@ -12,15 +12,13 @@ from typing import ClassVar
 
 import numpy as np
 
-from atg_fg.core.belief import IdentityBelief
-from atg_fg.core.memory import RobotMemory
-from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import FloatArray
 from atg_fg.engines.filtering import FilterInference
 from atg_fg.engines.gtsam_cells import CellFactor, EdgesInto, RowKinds, belief_factor
 from atg_fg.inference import gtsam_factors as factors
 from atg_fg.inference.expected_entropy import NextPatternJoint, expected_entropies
 from atg_fg.inference.factor_graph import RecognitionGraph
+from atg_fg.inference.interface import TrialSetup
 from atg_fg.inference.recognition_model import RecognitionModel
 
 _STATE = factors.aspect_key(0)
@@ -32,8 +30,8 @@ class GtsamElimination(FilterInference):
     name: ClassVar[str] = "gtsam"
     exact: ClassVar[bool] = True
 
-    def __init__(self, memory: RobotMemory, parameters: ModelParameters, prior: IdentityBelief | None = None) -> None:
-        super().__init__(memory, parameters, prior)
+    def __init__(self, setup: TrialSetup) -> None:
+        super().__init__(setup)
         self._transitions: dict[int, TransitionFactors] = {}
         self._hypothetical: HypotheticalFactors | None = None
 
@@ -82,13 +80,13 @@ class TransitionFactors:
     def __init__(self, model: RecognitionModel, action: int) -> None:
         chosen = model.edges.of_action(action)
         edges = model.edges.chosen(chosen)
-        self._rows = RowKinds(model.stay[[action]])
-        self._base = CellFactor(self._rows.stay)
+        self._rows = RowKinds(model.prior_weight[[action]])
+        self._base = CellFactor(self._rows.prior_weight)
         self._states = model.states
         cells = np.searchsorted(self._states, edges.hypothesis * model.n_states + edges.target)
         self._edges = EdgesInto(cells, len(self._states))
         self._sources = model.edge_source[chosen]
-        self._next = CellFactor(self._edges.table(model.base.ravel()[self._states], model.edge_probability[chosen]))
+        self._next = CellFactor(self._edges.table(model.base_row.ravel()[self._states], model.edge_probability[chosen]))
 
     def next_aspects(self, mass: FloatArray) -> FloatArray:
         """Return Σ_x mass(i, x) p(x' | x, a, i), shape [H, W], from ``mass`` [H, W]."""
@@ -110,10 +108,10 @@ class HypotheticalFactors:
         self._model = model
         observed = 1.0 - model.parameters.observation_noise
         noise = model.parameters.observation_noise / model.n_patterns
-        self._rows = RowKinds(model.stay)
-        unknown = np.tile(model.unknown_share, model.n_actions)
-        self._unknown = CellFactor(self._rows.stay * unknown + noise)
-        self._unreached = CellFactor(self._rows.stay * (observed / model.n_aspects) + noise)
+        self._rows = RowKinds(model.prior_weight)
+        unknown = np.tile(model.base_collection_rate, model.n_actions)
+        self._unknown = CellFactor(self._rows.prior_weight * unknown + noise)
+        self._unreached = CellFactor(self._rows.prior_weight * (observed / model.n_aspects) + noise)
         self._edges = EdgesInto(model.edge_target, len(model.targets.row))
         self._reached = CellFactor(self._edges.table(1.0, observed * model.edge_probability))
 

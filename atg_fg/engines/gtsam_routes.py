@@ -14,10 +14,7 @@ from typing import Any, ClassVar, Final
 import gtsam
 import numpy as np
 
-from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.errors import TooLargeError
-from atg_fg.core.memory import RobotMemory
-from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import FloatArray
 from atg_fg.engines.options import one_of
 from atg_fg.engines.whole_trial import Posterior, WholeTrialInference, joint_of
@@ -25,6 +22,7 @@ from atg_fg.inference import gtsam_factors as factors
 from atg_fg.inference.chain import Chain
 from atg_fg.inference.factor_graph import RecognitionGraph
 from atg_fg.inference.gtsam_factors import Ordering, aspect_key, object_key
+from atg_fg.inference.interface import TrialSetup
 
 #: Most values of an intermediate table.
 MAX_TABLE: Final = 5_000_000
@@ -74,8 +72,8 @@ class GtsamRoute(WholeTrialInference):
 
     exact: ClassVar[bool] = True
 
-    def __init__(self, memory: RobotMemory, parameters: ModelParameters, prior: IdentityBelief | None = None) -> None:
-        super().__init__(memory, parameters, prior)
+    def __init__(self, setup: TrialSetup) -> None:
+        super().__init__(setup)
         self.ordering = "colamd"
 
     @property
@@ -138,9 +136,7 @@ class _OrderedRoute(GtsamRoute):
     """Routes that take an ordering.
 
     Args:
-        memory: The robot memory when the trial begins; it is not changed.
-        parameters: α, δ and whether to learn within the trial.
-        prior: p(O) when the trial begins; the memory's if not given.
+        setup: What the trial begins with.
         ordering: A name in ``ORDERINGS``.
 
     Raises:
@@ -149,13 +145,11 @@ class _OrderedRoute(GtsamRoute):
 
     def __init__(
         self,
-        memory: RobotMemory,
-        parameters: ModelParameters,
-        prior: IdentityBelief | None = None,
+        setup: TrialSetup,
         *,
         ordering: str = "objects-last",
     ) -> None:
-        super().__init__(memory, parameters, prior)
+        super().__init__(setup)
         self.ordering = one_of("ordering", ordering, ORDERINGS)
 
 

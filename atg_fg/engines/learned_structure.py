@@ -14,12 +14,12 @@ import numpy as np
 from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.log_math import log_of, log_sum_exp
 from atg_fg.core.memory import RobotMemory
-from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, FloatArray
 from atg_fg.engines.bayes_filter import BayesFilter
 from atg_fg.inference.belief_components import LEAST_PROBABILITY, Situation, shown_patterns_of, situations_of
 from atg_fg.inference.belief_tree import ImaginedBelief
 from atg_fg.inference.chain import forward_backward
+from atg_fg.inference.interface import TrialSetup
 from atg_fg.inference.recognition_model import COLLECTION
 from atg_fg.learning.completion import pose_graph
 from atg_fg.learning.learner import BelievedStructure
@@ -44,42 +44,31 @@ class LearnedStructure(BayesFilter):
     exact: ClassVar[bool] = False
     knows_structure: ClassVar[bool] = True
 
-    def __init__(self, memory: RobotMemory, parameters: ModelParameters, prior: IdentityBelief | None = None) -> None:
-        super().__init__(memory, parameters, prior)
+    def __init__(self, setup: TrialSetup) -> None:
+        super().__init__(setup)
         believed: list[BelievedStructure] = []
         rates = Rates()
-        if parameters.learn_structure and isinstance(memory, StructuredMemory):
-            believed, rates = memory.learner.believed(memory.names), memory.learner.rates
+        if self.parameters.learn_structure and isinstance(self.memory, StructuredMemory):
+            believed, rates = self.memory.learner.believed(self.memory.names), self.memory.learner.rates
         followers = [each.weight * np.append(each.followers, rates.share) for each in believed]
         self._log_plain = log_of(1.0 - sum(followers, np.zeros(self.model.n_hypotheses)))
         self._followed = [
-            FollowedStructure(each, log_of(self.model.prior * follow), rates, memory)
+            FollowedStructure(each, log_of(self.model.prior * follow), rates, self.memory)
             for each, follow in zip(believed, followers, strict=True)
         ]
 
-    def observe(self, evidence: Evidence) -> None:
-        """Take in the evidence z_t of a look, then learn from it if the parameters say so.
-
-        Raises:
-            InvalidInputError: It is an action's turn, or the evidence is not over this alphabet.
-            ImpossibleEvidenceError: The evidence has probability zero for plain ATGs; nothing has changed.
-        """
-        super().observe(evidence)
+    def _look(self, evidence: Evidence) -> None:
+        super()._look(evidence)
         for each in self._followed:
             each.observe(evidence)
         if self._followed:
             least = self.log_evidence + np.log(RULED_OUT)
             self._followed = [each for each in self._followed if log_sum_exp(each.log_joint) > least]
 
-    def act(self, action: int) -> None:
-        """Predict the effect of an action a_{t+1}.
-
-        Raises:
-            InvalidInputError: It is an observation's turn, or there is no such action.
-        """
-        super().act(action)
+    def _act(self, action: int) -> None:
+        super()._act(action)
         for each in self._followed:
-            each.filter.act(self.history.actions[-1])
+            each.filter.act(action)
 
     def identity(self) -> IdentityBelief:
         """Return p(O | z_0:t, a_1:t) (eq. 1 and 2)."""

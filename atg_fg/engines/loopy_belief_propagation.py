@@ -12,14 +12,12 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.log_math import log_of, log_sum_exp
-from atg_fg.core.memory import RobotMemory
-from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import FloatArray
 from atg_fg.engines.options import number_between, one_of, whole_number
 from atg_fg.engines.whole_trial import Posterior, WholeTrialInference, joint_of
 from atg_fg.inference.chain import Chain
+from atg_fg.inference.interface import TrialSetup
 
 SCHEDULES = ("sequential", "parallel")
 
@@ -45,9 +43,7 @@ class LoopyBeliefPropagation(WholeTrialInference):
     are those of the factors' beliefs given O, whose messages from other times are not conditioned on O.
 
     Args:
-        memory: The robot memory when the trial begins; it is not changed.
-        parameters: α, δ and whether to learn within the trial.
-        prior: p(O) when the trial begins; the memory's if not given.
+        setup: What the trial begins with.
         damping: Share of the old message in each new one, from 0 to below 1; not used on a tree.
         schedule: ``sequential``, forwards and backwards through time and then to O, or ``parallel``, all at once.
         max_iterations: Most sweeps.
@@ -62,16 +58,14 @@ class LoopyBeliefPropagation(WholeTrialInference):
 
     def __init__(
         self,
-        memory: RobotMemory,
-        parameters: ModelParameters,
-        prior: IdentityBelief | None = None,
+        setup: TrialSetup,
         *,
         damping: float = 0.3,
         schedule: str = "sequential",
         max_iterations: int = 500,
         tolerance: float = 1e-10,
     ) -> None:
-        super().__init__(memory, parameters, prior)
+        super().__init__(setup)
         self.damping = number_between("damping", damping, 0.0, 1.0)
         self.schedule = one_of("schedule", schedule, SCHEDULES)
         self.max_iterations = whole_number("max_iterations", max_iterations, 1)

@@ -17,14 +17,12 @@ import numpy as np
 
 from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.log_math import log_sum_exp, x_log_x
-from atg_fg.core.memory import RobotMemory
-from atg_fg.core.parameters import ModelParameters
-from atg_fg.core.patterns import FloatArray
+from atg_fg.core.patterns import Evidence, FloatArray
 from atg_fg.engines.options import number_between, whole_number
 from atg_fg.engines.support import SupportedInference
 from atg_fg.inference.chain import forward_backward
 from atg_fg.inference.expected_entropy import expected_entropies_of
-from atg_fg.inference.recognition_model import Revelation
+from atg_fg.inference.interface import TrialSetup
 
 
 class MeanFieldReport(NamedTuple):
@@ -59,9 +57,7 @@ class MeanField(SupportedInference):
     forward-backward given O, since a filter has none.
 
     Args:
-        memory: The robot memory when the trial begins; it is not changed.
-        parameters: α, δ and whether to learn within the trial.
-        prior: p(O) when the trial begins; the memory's if not given.
+        setup: What the trial begins with.
         floor: Least J that a logarithm is taken of, relative to the greatest.
         max_iterations: Most sweeps a look.
         tolerance: Fall of the free energy in nats that counts as none.
@@ -80,23 +76,21 @@ class MeanField(SupportedInference):
 
     def __init__(
         self,
-        memory: RobotMemory,
-        parameters: ModelParameters,
-        prior: IdentityBelief | None = None,
+        setup: TrialSetup,
         *,
         floor: float = 1e-16,
         max_iterations: int = 200,
         tolerance: float = 1e-10,
     ) -> None:
-        super().__init__(memory, parameters, prior)
+        super().__init__(setup)
         self.floor = number_between("floor", floor, 1e-300, 1e-3)
         self.max_iterations = whole_number("max_iterations", max_iterations, 1)
         self.tolerance = number_between("tolerance", tolerance, 0.0, 1.0)
         self.objects: FloatArray = self.model.prior
-        self.aspects: FloatArray = self.model.prior @ self.model.base
+        self.aspects: FloatArray = self.model.prior @ self.model.base_row
         self.report: MeanFieldReport | None = None
         # p(O, X_t) as the next look finds it, shape [H, W]
-        self._predicted: FloatArray = self.model.prior[:, None] * self.model.base
+        self._predicted: FloatArray = self.model.prior[:, None] * self.model.base_row
         self._log_evidence = 0.0
 
     def identity(self) -> IdentityBelief:
@@ -121,7 +115,9 @@ class MeanField(SupportedInference):
         """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s by forward-backward."""
         return forward_backward(self.chain(hypothesis))
 
-    def _condition(self, likelihood: FloatArray) -> None:
+    def _look(self, evidence: Evidence) -> None:
+        likelihood = self.model.likelihood(evidence)
+        self._check_possible(likelihood)
         # Only the greatest weight matters for the floor, so evidence on any scale is brought to one.
         scale = float(likelihood.max())
         weights = self._predicted * (likelihood / scale)
@@ -129,15 +125,15 @@ class MeanField(SupportedInference):
             weights, self.floor, max_iterations=self.max_iterations, tolerance=self.tolerance
         )
         self._log_evidence += float(np.log(scale)) - self.report.free_energy
+        revelation = self._learn()
+        if revelation is not None:
+            mass = np.outer(self.objects, self.aspects)
+            mass = np.pad(mass, ((0, 0), (0, self.model.n_states - mass.shape[1])))
+            revelation.move(mass)
+            self.aspects = mass.sum(axis=0)
 
-    def _share(self, revelation: Revelation) -> None:
-        mass = np.outer(self.objects, self.aspects)
-        mass = np.pad(mass, ((0, 0), (0, self.model.n_states - mass.shape[1])))
-        revelation.move(mass)
-        self.aspects = mass.sum(axis=0)
-
-    def _advance(self, transition: FloatArray) -> None:
-        self._predicted = self.objects[:, None] * (self.aspects @ transition)
+    def _act(self, action: int) -> None:
+        self._predicted = self.objects[:, None] * (self.aspects @ self._predict_support(action))
 
 
 def factorised(

@@ -8,14 +8,14 @@ import numpy as np
 
 from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.log_math import log_of, log_sum_exp
-from atg_fg.core.memory import RobotMemory
-from atg_fg.core.parameters import ModelParameters
-from atg_fg.core.patterns import FloatArray, IntArray
+from atg_fg.core.patterns import Evidence, FloatArray, IntArray
 from atg_fg.engines.options import whole_number
 from atg_fg.engines.sampling import drawn
 from atg_fg.engines.support import SupportedInference
-from atg_fg.inference.chain import forward_backward, forward_pass
+from atg_fg.inference.chain import build_chain, forward_backward, forward_pass
 from atg_fg.inference.expected_entropy import expected_entropies_of
+from atg_fg.inference.history import History
+from atg_fg.inference.interface import TrialSetup
 from atg_fg.inference.recognition_model import COLLECTION, Revelation
 
 
@@ -33,9 +33,7 @@ class ParticleFilter(SupportedInference):
     Smoothed aspects are exact, by forward-backward given O: ancestral lines of a particle filter are too few.
 
     Args:
-        memory: The robot memory when the trial begins; it is not changed.
-        parameters: α, δ and whether to learn within the trial.
-        prior: p(O) when the trial begins; the memory's if not given.
+        setup: What the trial begins with.
         n_particles: Number of particles.
         seed: Seed of the filter's own generator.
 
@@ -54,14 +52,12 @@ class ParticleFilter(SupportedInference):
 
     def __init__(
         self,
-        memory: RobotMemory,
-        parameters: ModelParameters,
-        prior: IdentityBelief | None = None,
+        setup: TrialSetup,
         *,
         n_particles: int = 2000,
         seed: int = 0,
     ) -> None:
-        super().__init__(memory, parameters, prior)
+        super().__init__(setup)
         self.n_particles = whole_number("n_particles", n_particles, 1)
         self._rng = np.random.default_rng(whole_number("seed", seed, 0))
         self.objects: IntArray = np.zeros(0, dtype=np.int64)
@@ -108,9 +104,17 @@ class ParticleFilter(SupportedInference):
         """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s by forward-backward."""
         return forward_backward(self.chain(hypothesis))
 
+    def _look(self, evidence: Evidence) -> None:
+        likelihood = self.model.likelihood(evidence)
+        self._check_possible(likelihood)
+        self._condition(likelihood)
+        revelation = self._learn()
+        if revelation is not None:
+            self._divide(revelation)
+
     def _condition(self, likelihood: FloatArray) -> None:
         if self._transition is None:
-            self._draw(self.model.prior[:, None] * self.model.base * (likelihood / likelihood.max()))
+            self._draw(self.model.prior[:, None] * self.model.base_row * (likelihood / likelihood.max()))
             self._log_evidence += float(np.log(likelihood.max()))
             return
         # p(x_t, z_t | x_{t-1}, a_t, o) of every state, shape [H, W, W]
@@ -129,7 +133,7 @@ class ParticleFilter(SupportedInference):
         if self.effective_sample_size < self.n_particles / 2:
             self._resample()
 
-    def _share(self, revelation: Revelation) -> None:
+    def _divide(self, revelation: Revelation) -> None:
         """Move each particle at a collection node to the aspect just found with the probability of its share."""
         share = np.zeros(self.model.n_hypotheses)
         state = np.zeros(self.model.n_hypotheses, dtype=np.int64)
@@ -138,8 +142,8 @@ class ParticleFilter(SupportedInference):
         moves = (self.aspects == COLLECTION) & (chance < share[self.objects])
         self.aspects = np.where(moves, state[self.objects], self.aspects)
 
-    def _advance(self, transition: FloatArray) -> None:
-        self._transition = transition
+    def _act(self, action: int) -> None:
+        self._transition = self._predict_support(action)
 
     def _draw(self, mass: FloatArray) -> None:
         """Draw all particles from weights of (O, X_t), shape [H, W], and count their sum as evidence."""
@@ -151,7 +155,8 @@ class ParticleFilter(SupportedInference):
 
     def _rejuvenate(self, likelihood: FloatArray) -> None:
         """Draw all particles anew from the exact one-step prior times the likelihood."""
-        chain, _ = self.chain().scaled()
+        before = History(self.history.evidence[:-1], self.history.actions)
+        chain, _ = build_chain(self.memory, self.parameters, before, prior=self.prior).scaled()
         past = forward_pass(chain)
         # Only differences count, and those of an object below the least float would not be drawn anyway; with the
         # likelihood inside the logarithm the greatest of them is 1.

@@ -8,13 +8,11 @@ from typing import NamedTuple
 import numpy as np
 
 from atg_fg.core.belief import IdentityBelief
-from atg_fg.core.memory import RobotMemory
-from atg_fg.core.parameters import ModelParameters
-from atg_fg.core.patterns import FloatArray
+from atg_fg.core.patterns import Evidence, FloatArray
 from atg_fg.engines.support import SupportedInference
 from atg_fg.inference.chain import Chain
 from atg_fg.inference.expected_entropy import expected_entropies_of
-from atg_fg.inference.recognition_model import Revelation
+from atg_fg.inference.interface import TrialSetup
 
 
 class Posterior(NamedTuple):
@@ -34,8 +32,8 @@ class Posterior(NamedTuple):
 class WholeTrialInference(SupportedInference):
     """Engines that make a ``Posterior`` of the trial's chain at the first question after a step, and keep it."""
 
-    def __init__(self, memory: RobotMemory, parameters: ModelParameters, prior: IdentityBelief | None = None) -> None:
-        super().__init__(memory, parameters, prior)
+    def __init__(self, setup: TrialSetup) -> None:
+        super().__init__(setup)
         self._posterior: Posterior | None = None
 
     @property
@@ -61,7 +59,7 @@ class WholeTrialInference(SupportedInference):
         return self.posterior.joint
 
     def _prior(self) -> Posterior:
-        return Posterior(self.model.prior, self.model.prior[:, None] * self.model.base, 0.0)
+        return Posterior(self.model.prior, self.model.prior[:, None] * self.model.base_row, 0.0)
 
     def _solve_scaled(self) -> Posterior:
         chain, log_scale = self.chain().scaled()
@@ -72,13 +70,13 @@ class WholeTrialInference(SupportedInference):
         """Return eq. 3 for each action, shape [A], exactly so for the engine's own p(O, X_t)."""
         return expected_entropies_of(self.model, self.aspect_belief)
 
-    def _condition(self, likelihood: FloatArray) -> None:
+    def _look(self, evidence: Evidence) -> None:
+        self._check_possible(self.model.likelihood(evidence))
+        self._learn()
         self._posterior = None
 
-    def _share(self, revelation: Revelation) -> None:
-        self._posterior = None
-
-    def _advance(self, transition: FloatArray) -> None:
+    def _act(self, action: int) -> None:
+        self._predict_support(action)
         self._posterior = None
 
     @abstractmethod

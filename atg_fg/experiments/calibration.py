@@ -53,7 +53,7 @@ def draw_trial(
     """
     model = RecognitionModel(memory, parameters)
     hypothesis = int(rng.choice(model.n_hypotheses, p=model.prior))
-    state = int(rng.choice(model.n_states, p=model.base[hypothesis]))
+    state = int(rng.choice(model.n_states, p=model.base_row[hypothesis]))
     patterns: list[int] = []
     actions: list[int] = []
     while True:
@@ -76,7 +76,7 @@ def _shown(model: RecognitionModel, hypothesis: int, state: int) -> FloatArray:
     noise = model.parameters.observation_noise
     truth = np.zeros(model.n_patterns)
     if state == COLLECTION:
-        truth = model.unknown_rate[hypothesis] * model.unknown[hypothesis]
+        truth = model.collection_rate[hypothesis] * model.lacks[hypothesis]
     else:
         truth[model.pattern_of[hypothesis, state]] = 1.0 - noise
     return truth + noise / model.n_patterns

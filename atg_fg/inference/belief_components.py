@@ -65,7 +65,7 @@ def shown_patterns_of(model: RecognitionModel, belief: FloatArray, evidence: Evi
     # In a collection node it is a pattern that the object was not known to show, as far as the evidence agrees.
     noise = model.parameters.observation_noise
     agrees = (1.0 - noise) * evidence.likelihood + noise * evidence.likelihood.mean()
-    unknown = model.unknown @ agrees
+    unknown = model.lacks @ agrees
     share = np.divide(belief[:, COLLECTION], unknown, out=np.zeros_like(unknown), where=unknown > 0)
-    shown += agrees * (share @ model.unknown)
+    shown += agrees * (share @ model.lacks)
     return shown

@@ -91,7 +91,7 @@ class TableLooks:
 
     def __init__(self, model: RecognitionModel, predicted: FloatArray) -> None:
         self._model = model
-        known = np.any(model.known > 0, axis=0)
+        known = np.any(model.knows > 0, axis=0)
         patterns = np.flatnonzero(known)
         #: the look that each pattern is, shape [|𝒵|]
         self._look_of = np.where(known, np.cumsum(known) - 1, len(patterns))
@@ -103,7 +103,7 @@ class TableLooks:
         #: y_i(z), shape [H, L]
         self._states = model.aspect_of[:, patterns]
         observed = 1.0 - model.parameters.observation_noise
-        rates = np.where(self._states == COLLECTION, model.unknown_rate[:, None], observed)
+        rates = np.where(self._states == COLLECTION, model.collection_rate[:, None], observed)
         #: the part of p(O, X', look | a) that is an entry of the look's own, shape [H, L] …
         self._own = n_patterns * rates * predicted[rows, self._states]
         #: … and that which is the same for all looks but for this factor, shapes [H, W] and [L]
@@ -142,8 +142,8 @@ class TableLooks:
     def _kept(self, looks: IntArray) -> FloatArray:
         """Return the mass, with each look, that the next action's rows leave to their base, shape [N, A, H]."""
         model = self._model
-        shared = np.einsum("hx,ahx->ah", self._shared, model.stay)
-        of_own = model.stay[:, np.arange(model.n_hypotheses)[:, None], self._states[:, looks]]
+        shared = np.einsum("hx,ahx->ah", self._shared, model.prior_weight)
+        of_own = model.prior_weight[:, np.arange(model.n_hypotheses)[:, None], self._states[:, looks]]
         own = (of_own * self._own[:, looks]).transpose(2, 0, 1)
         kept: FloatArray = self._share[looks][:, None, None] * shared + own
         return kept

@@ -7,7 +7,7 @@ belief, so the chain of a trial can be made again at any time from what was done
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -17,37 +17,9 @@ from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.log_math import log_of
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
-from atg_fg.core.patterns import Evidence, FloatArray
-from atg_fg.inference.recognition_model import COLLECTION, RecognitionModel, Revelation
-
-
-@dataclass
-class History:
-    """What was seen and done in a trial: z_0, a_1, z_1, …; it may end with an action.
-
-    Attributes:
-        evidence: The evidence of each look.
-        actions: Index of each action; as many as looks, or one less.
-    """
-
-    evidence: list[Evidence] = field(default_factory=list)
-    actions: list[int] = field(default_factory=list)
-
-    @property
-    def awaits_evidence(self) -> bool:
-        """Whether the next entry is a look rather than an action."""
-        return len(self.evidence) == len(self.actions)
-
-    def up_to(self, step: int) -> History:
-        """Return the last two looks up to time ``step``, with the action between them."""
-        first = max(step - 1, 0)
-        return History(self.evidence[first : step + 1], self.actions[first:step])
-
-    def learn(self, model: RecognitionModel) -> Revelation | None:
-        """Let ``model`` learn from the last look of this history."""
-        if len(self.evidence) == 1:
-            return model.learn(None, None, self.evidence[0].pattern)
-        return model.learn(self.evidence[-2].pattern, self.actions[-1], self.evidence[-1].pattern)
+from atg_fg.core.patterns import FloatArray
+from atg_fg.inference.history import History
+from atg_fg.inference.recognition_model import COLLECTION, RecognitionModel
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,9 +82,9 @@ def build_chain(
     incoming: list[FloatArray] = []
     likelihoods: list[FloatArray] = []
     for step, evidence in enumerate(history.evidence):
-        table = model.transition(history.actions[step - 1]) if step else model.base
+        table = model.transition(history.actions[step - 1]) if step else model.base_row
         likelihood = model.likelihood(evidence)
-        revelation = history.up_to(step).learn(model)
+        revelation = model.learn_from(history, step)
         if revelation is not None:
             padding = [(0, 0)] * (table.ndim - 1) + [(0, model.n_states - table.shape[-1])]
             table, likelihood = np.pad(table, padding), np.pad(likelihood, padding[-2:])

@@ -44,7 +44,7 @@ class NextPatternJoint(NamedTuple):
         noise = model.parameters.observation_noise / model.n_patterns * total
         unreached = kept * (observed / model.n_aspects) + noise
         return cls(
-            unknown=kept * model.unknown_share + noise,
+            unknown=kept * model.base_collection_rate + noise,
             unreached=unreached,
             reached=_of_targets(model, unreached) + observed * arrived,
         )
@@ -62,7 +62,7 @@ def expected_entropies(model: RecognitionModel, joint: NextPatternJoint, unseen:
     unreached, reached, unknown = x_log_x(joint.unreached), x_log_x(joint.reached), x_log_x(joint.unknown)
     joint_terms = (
         np.vecdot(unreached, model.n_unreached)
-        + unknown @ model.n_unknown
+        + unknown @ model.n_lacking
         + _sums(reached, model.targets.action, model.n_actions)
     )
     entropies: FloatArray = x_log_x(predictive).sum(axis=-1) - joint_terms + unseen * np.log(model.n_unseen)
@@ -72,7 +72,7 @@ def expected_entropies(model: RecognitionModel, joint: NextPatternJoint, unseen:
 def _predictive(model: RecognitionModel, joint: NextPatternJoint) -> FloatArray:
     """Return p(z | a), shape [..., A, |𝒵|]: as if all objects knew none, and what it is more where they know it."""
     unknown, unreached, reached = joint
-    predictive = unknown.sum(axis=-1)[..., None] + (unreached - unknown) @ model.known
+    predictive = unknown.sum(axis=-1)[..., None] + (unreached - unknown) @ model.knows
     excess = _sums(reached - _of_targets(model, unreached), model.targets.pattern, model.n_actions * model.n_patterns)
     predictive += excess.reshape(predictive.shape)
     # Subtracting may leave a rounding error below zero.
@@ -108,15 +108,15 @@ def next_pattern_joint(model: RecognitionModel, mass: FloatArray) -> NextPattern
         model: The tables in force.
         mass: p(O, X_t | z_0:t), or an approximation of it, shape [H, W].
     """
-    kept = np.vecdot(mass, model.stay)
+    kept = np.vecdot(mass, model.prior_weight)
     return NextPatternJoint.of(model, mass @ np.ones(model.n_states), kept, arrivals(model, mass))
 
 
 def pattern_table(model: RecognitionModel, joint: NextPatternJoint, hypotheses: IntArray) -> FloatArray:
     """Return J = p(O = i, z | a) of every pattern, shape [A, I, |𝒵|], for the I ``hypotheses`` in question."""
     table: FloatArray = (
-        joint.unknown[:, hypotheses, None] * model.unknown[hypotheses]
-        + joint.unreached[:, hypotheses, None] * model.known[hypotheses]
+        joint.unknown[:, hypotheses, None] * model.lacks[hypotheses]
+        + joint.unreached[:, hypotheses, None] * model.knows[hypotheses]
     )
     place = np.full(model.n_hypotheses, -1)
     place[hypotheses] = np.arange(len(hypotheses))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from types import MappingProxyType
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -16,20 +16,39 @@ from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, FloatArray
 from atg_fg.inference.belief_components import Situation, shown_patterns_of, situations_of
 from atg_fg.inference.belief_tree import ImaginedBelief, TableBelief
-from atg_fg.inference.chain import Chain, History, build_chain
+from atg_fg.inference.chain import Chain, build_chain
+from atg_fg.inference.history import History
 from atg_fg.inference.recognition_model import RecognitionModel, Revelation
+
+
+class TrialSetup(NamedTuple):
+    """What a trial begins with.
+
+    Attributes:
+        memory: The robot memory; it is not changed, and must not change while the trial goes on.
+        parameters: α, δ and whether to learn within the trial.
+        prior: p(O); the memory's if ``None``.
+    """
+
+    memory: RobotMemory
+    parameters: ModelParameters
+    prior: IdentityBelief | None = None
 
 
 class Inference(ABC):
     """Inference in one trial: look, act, look, act …, and ask for the posterior at any time.
 
     A subclass is an engine. It says by ``exact`` whether its posteriors are those of the model, and by
-    ``knows_structure`` whether it can let objects follow a structure that all share.
+    ``knows_structure`` whether it can let objects follow a structure that all share. It answers ``identity`` and
+    ``log_evidence``, and four hooks that are called once what was asked is known to make sense: ``_look``, ``_act``,
+    ``_expected_entropies`` and ``_smoothed_aspects``. Its options are keyword-only arguments of its constructor.
 
     Args:
-        memory: The robot memory when the trial begins; it is not changed.
-        parameters: α, δ and whether to learn within the trial.
-        prior: p(O) when the trial begins; the memory's if not given.
+        setup: What the trial begins with.
+
+    Attributes:
+        model: The tables in force.
+        history: What was seen and done so far.
     """
 
     name: ClassVar[str]
@@ -38,10 +57,8 @@ class Inference(ABC):
     #: The engine's own options that ``begin_trial`` was given.
     options: Mapping[str, Any] = MappingProxyType({})
 
-    def __init__(self, memory: RobotMemory, parameters: ModelParameters, prior: IdentityBelief | None = None) -> None:
-        self.memory = memory
-        self.parameters = parameters
-        self.prior = prior
+    def __init__(self, setup: TrialSetup) -> None:
+        self.memory, self.parameters, self.prior = setup
         self.model = self._tables()
         self.history = History()
 
@@ -59,11 +76,12 @@ class Inference(ABC):
         if not self.history.awaits_evidence:
             raise InvalidInputError("trial: two observations in a row; expected an action between them")
         evidence.check(self.model.n_patterns)
-        self._look(evidence)
         self.history.evidence.append(evidence)
-        revelation = self.history.learn(self.model)
-        if revelation is not None:
-            self._divide(revelation)
+        try:
+            self._look(evidence)
+        except BaseException:
+            self.history.evidence.pop()
+            raise
 
     def act(self, action: int) -> None:
         """Predict the effect of an action a_{t+1}.
@@ -76,8 +94,12 @@ class Inference(ABC):
         whole = isinstance(action, (int, np.integer)) and not isinstance(action, bool)
         if not whole or not 0 <= action < self.model.n_actions:
             raise InvalidInputError(f"action: {action!r}; expected 0 to {self.model.n_actions - 1}")
-        self._predict(int(action))
         self.history.actions.append(int(action))
+        try:
+            self._act(int(action))
+        except BaseException:
+            self.history.actions.pop()
+            raise
 
     def expected_entropies(self) -> FloatArray:
         """E[H(O | z_{t+1}, a, …)] of each action (eq. 3) in nats, shape [A].
@@ -131,9 +153,9 @@ class Inference(ABC):
             raise InvalidInputError(f"{asked}: asked before the look; expected an observation first")
 
     def _impossible(self) -> ImpossibleEvidenceError:
-        """Return the error for a look, the one about to be taken in, that no hypothesis allows."""
+        """Return the error for the last look, if no hypothesis allows it."""
         return ImpossibleEvidenceError(
-            f"observation {len(self.history.evidence)}: the evidence has probability zero under the model; "
+            f"observation {len(self.history.evidence) - 1}: the evidence has probability zero under the model; "
             "expected evidence that some object could give, or noise above 0"
         )
 
@@ -155,7 +177,7 @@ class Inference(ABC):
     def aspect_belief(self) -> FloatArray:
         """p(O, X_t | z_0:t, a_1:t), shape [H, W]; after an action X_t is the aspect that it leads to."""
         if not self.history.evidence:
-            return self.model.prior[:, None] * self.model.base
+            return self.model.prior[:, None] * self.model.base_row
         joint = np.zeros((self.model.n_hypotheses, self.model.n_states))
         identity = self.identity().probabilities
         for hypothesis in np.flatnonzero(identity):
@@ -187,26 +209,31 @@ class Inference(ABC):
             )
         return marginals
 
-    @abstractmethod
-    def _smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
-        """Return ``smoothed_aspects``, or zeros, of a hypothesis that there is."""
+    def _learn(self) -> Revelation | None:
+        """Let the tables learn from the last look; return how belief in collection nodes is to be divided, if so."""
+        return self.model.learn_from(self.history, len(self.history.evidence) - 1)
 
+    @abstractmethod
     def _look(self, evidence: Evidence) -> None:
-        """Condition on a look; raise before any change if it is impossible."""
-        self._update(self.model.likelihood(evidence))
+        """Condition on a look, the last of ``history``, and learn from it.
+
+        An engine that keeps a belief divides that of the collection nodes as ``_learn`` returns it.
+
+        Raises:
+            ImpossibleEvidenceError: The look is impossible (``_impossible``); raised before any change.
+        """
 
     @abstractmethod
-    def _update(self, likelihood: FloatArray) -> None:
-        """Condition on a look with p(z | x, i), shape [H, W]; raise before any change if impossible."""
-
-    @abstractmethod
-    def _divide(self, revelation: Revelation) -> None:
-        """Move belief from collection nodes to the aspects just found; the model has them already."""
-
-    @abstractmethod
-    def _predict(self, action: int) -> None:
-        """Add the action's transition."""
+    def _act(self, action: int) -> None:
+        """Predict the effect of an action, the last of ``history``; if this raises, nothing has changed."""
 
     @abstractmethod
     def _expected_entropies(self) -> FloatArray:
-        """Return eq. 3 for each action, shape [A]."""
+        """Return E[H(O | z_{t+1}, a, …)] of each action (eq. 3) in nats, shape [A]; called after a look."""
+
+    @abstractmethod
+    def _smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
+        """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s, each of shape [W_s], or zeros.
+
+        Called after the first look, for a hypothesis whose prior probability is above zero.
+        """

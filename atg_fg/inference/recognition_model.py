@@ -1,9 +1,21 @@
-"""Memory and assumptions as the tables of a hidden Markov model, one chain for each state of O.
+r"""Memory and assumptions as the tables of a hidden Markov model, one chain for each state of O.
 
 Hypothesis i < K is a remembered object, hypothesis K is *unseen*. State 0 of a hypothesis is its collection
-node, state 1 + k its k-th known aspect; hypotheses that know fewer aspects are padded with states of
-probability zero. A transition row is never stored: it is ``stay · base`` plus its counted edges, where
-``stay`` = α / (c + α) is the share that the Dirichlet prior keeps.
+node C, state 1 + k its k-th known aspect; hypotheses that know fewer aspects are padded with states of
+probability zero. A transition row is never stored: it is ``prior_weight · base_row`` plus its counted edges.
+
+With n of G aspects known, c transitions counted from x by a, and the symbols of ``docs/model.md``:
+
+=========================  ========================================  ==============================================
+``prior_weight``           α / (c + α)                               what the Dirichlet prior keeps of a row, [A, H, W]
+``base_row``               1/G of an aspect, (G − n)/G of C          p(x' | x, a, i) if nothing was counted, [H, W]
+``edge_probability``       count / (c + α)                           what an edge adds to its row, [E]
+``knows``, ``lacks``       1 or 0                                    whether an aspect shows z, or none, [H, |𝒵|]
+``n_lacking``              \|𝒵\| − n                                 patterns that no known aspect shows, [H]
+``collection_rate``        (1 − δ) / (\|𝒵\| − n), 0 if n = G         p(z | C, i) of each of these without noise, [H]
+``base_collection_rate``   (G − n)/G · ``collection_rate``           the same of the next look by ``base_row``, [H]
+``n_unreached``                                                      known aspects that no edge of a leads to, [A, H]
+=========================  ========================================  ==============================================
 """
 
 from __future__ import annotations
@@ -11,26 +23,21 @@ from __future__ import annotations
 import math
 from copy import copy
 from itertools import chain
-from typing import Final, NamedTuple, TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from atg_fg.core.belief import IdentityBelief
+from atg_fg.core.compact.columns import positions
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, FloatArray, IntArray
 from atg_fg.inference.counted_edges import Edges, Targets, distinct
+from atg_fg.inference.history import History
 
 #: State index of the collection node.
 COLLECTION = 0
-
-
-#: Attributes of a ``RecognitionModel`` whose first axis are its hypotheses.
-_BY_HYPOTHESIS: Final = (
-    *("prior", "n_known", "aspect_of", "pattern_of", "base", "known", "unknown", "n_unknown"),
-    *("unknown_rate", "unknown_share"),
-)
 
 
 _Number = TypeVar("_Number", np.float64, np.int64)
@@ -78,37 +85,37 @@ class RecognitionModel:
     """
 
     def __init__(self, memory: RobotMemory, parameters: ModelParameters, prior: IdentityBelief | None = None) -> None:
-        assumptions = memory.assumptions
-        self.memory = memory
-        self.parameters = parameters
-        self.n_actions = len(assumptions.actions)
-        self.n_aspects = assumptions.n_aspects
-        self.n_patterns = len(assumptions.alphabet)
-        self.n_unseen = memory.n_unseen
-        self.n_hypotheses = len(memory) + 1
+        self._set_sizes(memory, parameters, prior)
         graphs = list(memory)
-        if prior is None:
-            self.prior = IdentityBelief.uniform(len(graphs), self.n_unseen).probabilities
-        else:
-            prior.check(len(graphs), self.n_unseen)
-            self.prior = prior.probabilities / prior.probabilities.sum()
         self.n_known = np.array([graph.n_known for graph in graphs] + [0], dtype=np.int64)
         self.aspect_of = np.full((self.n_hypotheses, self.n_patterns), COLLECTION, dtype=np.int64)
         self.pattern_of = np.full((self.n_hypotheses, 1 + int(self.n_known.max())), -1, dtype=np.int64)
         patterns = np.fromiter(chain.from_iterable(graph.pattern_indices for graph in graphs), dtype=np.int64)
         hypotheses = np.repeat(np.arange(self.n_hypotheses), self.n_known)
-        states = 1 + np.arange(len(patterns)) - np.repeat(np.cumsum(self.n_known) - self.n_known, self.n_known)
+        states = positions(np.ones_like(self.n_known), self.n_known)
         self.pattern_of[hypotheses, states] = patterns
         self.aspect_of[hypotheses, patterns] = states
-        #: which patterns a hypothesis knows, and which not, as 1.0 and 0.0, shape [H, |𝒵|]
-        self.known = (self.aspect_of != COLLECTION).astype(np.float64)
-        self.unknown = 1.0 - self.known
         owners = np.repeat(np.arange(len(graphs)), [graph.n_counted for graph in graphs])
         columns = np.concatenate([np.empty((0, 4), dtype=np.int64), *(graph.count_table for graph in graphs)]).T
         source, action, target, count = columns
         self.edges = Edges(action, owners, 1 + source, 1 + target, count.astype(np.float64))
         self._refresh_aspects()
         self._refresh_transitions()
+
+    def _set_sizes(self, memory: RobotMemory, parameters: ModelParameters, prior: IdentityBelief | None) -> None:
+        """Set all that asks for no table over objects and patterns."""
+        self.memory = memory
+        self.parameters = parameters
+        self.n_actions = len(memory.assumptions.actions)
+        self.n_aspects = memory.assumptions.n_aspects
+        self.n_patterns = len(memory.assumptions.alphabet)
+        self.n_unseen = memory.n_unseen
+        self.n_hypotheses = len(memory) + 1
+        if prior is None:
+            self.prior = IdentityBelief.uniform(len(memory), self.n_unseen).probabilities
+        else:
+            prior.check(len(memory), self.n_unseen)
+            self.prior = prior.probabilities / prior.probabilities.sum()
 
     @property
     def n_states(self) -> int:
@@ -122,17 +129,15 @@ class RecognitionModel:
 
     def _refresh_aspects(self) -> None:
         """Make everything that follows from which aspects are known."""
-        delta, n_patterns = self.parameters.observation_noise, self.n_patterns
+        delta = self.parameters.observation_noise
         n_unobserved = self.n_aspects - self.n_known
-        #: p(next aspect) where nothing was counted, shape [H, W]
-        self.base = np.where(self.pattern_of >= 0, 1.0 / self.n_aspects, 0.0)
-        self.base[:, COLLECTION] = n_unobserved / self.n_aspects
-        #: how many patterns a hypothesis does not know, shape [H]
-        self.n_unknown = (n_patterns - self.n_known).astype(np.float64)
-        #: p(z | C_i) without noise of each pattern that no known aspect shows, shape [H]
-        self.unknown_rate = np.where(n_unobserved > 0, (1.0 - delta) / np.maximum(self.n_unknown, 1.0), 0.0)
-        #: the same of the next look if nothing was counted, shape [H]
-        self.unknown_share = self.base[:, COLLECTION] * self.unknown_rate
+        self.base_row = np.where(self.pattern_of >= 0, 1.0 / self.n_aspects, 0.0)
+        self.base_row[:, COLLECTION] = n_unobserved / self.n_aspects
+        self.knows = (self.aspect_of != COLLECTION).astype(np.float64)
+        self.lacks = 1.0 - self.knows
+        self.n_lacking = (self.n_patterns - self.n_known).astype(np.float64)
+        self.collection_rate = np.where(n_unobserved > 0, (1.0 - delta) / np.maximum(self.n_lacking, 1.0), 0.0)
+        self.base_collection_rate = self.base_row[:, COLLECTION] * self.collection_rate
 
     def _refresh_transitions(self) -> None:
         """Make everything that follows from the counted transitions."""
@@ -140,19 +145,13 @@ class RecognitionModel:
         edges, shape = self.edges, (self.n_actions, self.n_hypotheses, self.n_states)
         rows = (edges.action * self.n_hypotheses + edges.hypothesis) * self.n_states + edges.source
         totals = np.bincount(rows, weights=edges.weight, minlength=math.prod(shape))[rows] + alpha
-        #: α / (c + α), the share of ``base`` in each transition row, shape [A, H, W]
-        self.stay = np.ones(shape)
-        self.stay.ravel()[rows] = alpha / totals
-        #: the rest of each row, divided over its edges, shape [E]
+        self.prior_weight = np.ones(shape)
+        self.prior_weight.ravel()[rows] = alpha / totals
         self.edge_probability = edges.weight / totals
         #: flat index of each edge's (hypothesis, source), shape [E]
         self.edge_source = edges.hypothesis * self.n_states + edges.source
-        self._refresh_targets(rows + (edges.target - edges.source))
-
-    def _refresh_targets(self, cells: IntArray) -> None:
-        """Make everything that follows from the (action, hypothesis, target) of each edge, flat indices [E]."""
         #: which target each edge leads to, shape [E]
-        self.edge_target, one_edge = distinct(cells, self.stay.size)
+        self.edge_target, one_edge = distinct(rows + (edges.target - edges.source), self.prior_weight.size)
         action, hypothesis, _, state, _ = self.edges.chosen(one_edge)
         row = action * self.n_hypotheses + hypothesis
         #: what edges lead to
@@ -160,12 +159,11 @@ class RecognitionModel:
             action, hypothesis, state, row, action * self.n_patterns + self.pattern_of[hypothesis, state]
         )
         n_targets = np.bincount(row, minlength=self.n_actions * self.n_hypotheses).reshape(self.n_actions, -1)
-        #: how many known aspects of a hypothesis no edge of an action leads to, shape [A, H]
         self.n_unreached = (self.n_known - n_targets).astype(np.float64)
 
     def transition(self, action: int) -> FloatArray:
         """Return p(x' | x, a, i) with its padding, shape [H, W, W]; see ``docs/model.md``."""
-        table: FloatArray = self.stay[action][:, :, None] * self.base[:, None, :]
+        table: FloatArray = self.prior_weight[action][:, :, None] * self.base_row[:, None, :]
         chosen = self.edges.action == action
         where = (self.edges.hypothesis[chosen], self.edges.source[chosen], self.edges.target[chosen])
         np.add.at(table, where, self.edge_probability[chosen])
@@ -176,9 +174,9 @@ class RecognitionModel:
         chosen = self.edges.of_action(action)
         targets = self.edges.hypothesis[chosen] * self.n_states + self.edges.target[chosen]
         carried = mass.ravel()[self.edge_source[chosen]] * self.edge_probability[chosen]
-        arrived = np.bincount(targets, weights=carried, minlength=self.base.size).reshape(self.base.shape)
-        kept = np.vecdot(mass, self.stay[action])
-        predicted: FloatArray = kept[:, None] * self.base + arrived
+        arrived = np.bincount(targets, weights=carried, minlength=self.base_row.size).reshape(self.base_row.shape)
+        kept = np.vecdot(mass, self.prior_weight[action])
+        predicted: FloatArray = kept[:, None] * self.base_row + arrived
         return predicted
 
     def likelihood(self, evidence: Evidence) -> FloatArray:
@@ -187,7 +185,7 @@ class RecognitionModel:
         shown = (1.0 - self.parameters.observation_noise) * evidence.likelihood + noise
         # At index -1, the pattern of collection nodes and padding, there is noise alone.
         table: FloatArray = np.append(shown, noise)[self.pattern_of]
-        table[:, COLLECTION] = self.unknown_rate * (self.unknown @ evidence.likelihood) + noise
+        table[:, COLLECTION] = self.collection_rate * (self.lacks @ evidence.likelihood) + noise
         return table
 
     def restricted(self, hypotheses: IntArray) -> RecognitionModel:
@@ -198,19 +196,19 @@ class RecognitionModel:
         """
         part = copy(self)
         part.n_hypotheses = len(hypotheses)
-        for name in _BY_HYPOTHESIS:
-            setattr(part, name, getattr(self, name)[hypotheses])
-        part.stay = self.stay[:, hypotheses]
+        part.prior, part.n_known = self.prior[hypotheses], self.n_known[hypotheses]
+        part.aspect_of, part.pattern_of = self.aspect_of[hypotheses], self.pattern_of[hypotheses]
         number = np.full(self.n_hypotheses, -1)
         number[hypotheses] = np.arange(len(hypotheses))
-        kept = number[self.edges.hypothesis] >= 0
-        part.edges = self.edges.chosen(kept)._replace(hypothesis=number[self.edges.hypothesis[kept]])
-        part.edge_probability = self.edge_probability[kept]
-        part.edge_source = part.edges.hypothesis * part.n_states + part.edges.source
-        part._refresh_targets(
-            np.ravel_multi_index((part.edges.action, part.edges.hypothesis, part.edges.target), part.stay.shape)
-        )
+        kept = self.edges.chosen(number[self.edges.hypothesis] >= 0)
+        part.edges = kept._replace(hypothesis=number[kept.hypothesis])
+        part._refresh_aspects()
+        part._refresh_transitions()
         return part
+
+    def learn_from(self, history: History, time: int) -> Revelation | None:
+        """Extend every hypothesis by the look at a time of a trial, as ``learn`` does; ``None`` if no aspect is new."""
+        return self.learn(*history.step(time))
 
     def learn(self, previous: int | None, action: int | None, pattern: int | None) -> Revelation | None:
         """Extend every hypothesis by what was just seen (``learn_in_trial``), for the steps to come.
@@ -236,7 +234,7 @@ class RecognitionModel:
         hypotheses = np.flatnonzero(lacks)
         if not len(hypotheses):
             return None
-        truth = self.unknown_rate[hypotheses]
+        truth = self.collection_rate[hypotheses]
         noise = self.parameters.observation_noise / self.n_patterns
         last = self.n_known[hypotheses] + 1 == self.n_aspects
         shares = np.where(last, 1.0, truth / (truth + noise))
@@ -245,8 +243,6 @@ class RecognitionModel:
         self.pattern_of = widened(self.pattern_of, int(states.max()) + 1, -1)
         self.aspect_of[hypotheses, pattern] = states
         self.pattern_of[hypotheses, states] = pattern
-        self.known[hypotheses, pattern] = 1.0
-        self.unknown[hypotheses, pattern] = 0.0
         self._refresh_aspects()
         return Revelation(hypotheses, states, shares)
 

@@ -37,7 +37,7 @@ def pattern_marginals(inference: Inference, hypothesis: int) -> FloatArray:
         shown = model.pattern_of[hypothesis, 1 : len(aspects)]
         known = shown >= 0
         np.add.at(table[look], shown[known], aspects[1:][known])
-        unknown = model.unknown[hypothesis] * (
+        unknown = model.lacks[hypothesis] * (
             (1 - model.parameters.observation_noise) * evidence.likelihood
             + model.parameters.observation_noise / model.n_patterns * evidence.likelihood.sum()
         )

@@ -12,11 +12,12 @@ import numpy as np
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
-from atg_fg.core.patterns import Evidence, FloatArray, PatternAlphabet
-from atg_fg.inference.chain import History, build_chain, forward_pass
+from atg_fg.core.patterns import MISSING, Evidence, FloatArray, PatternAlphabet
+from atg_fg.inference.chain import build_chain, forward_pass
+from atg_fg.inference.history import History
 from atg_fg.learning.pose_filter import PoseFilter
 from atg_fg.learning.rates import Rates
-from atg_fg.learning.raw_trials import NOT_SEEN, RawTrial, TrialArrays, side_by_side
+from atg_fg.learning.raw_trials import RawTrial, TrialArrays, side_by_side
 from atg_fg.learning.shared_structure import SharedStructure
 
 #: Noise of the plain ATG that a structure has to explain trials better than.
@@ -76,10 +77,10 @@ def follow(own: PoseFilter, trials: TrialArrays, alphabet: PatternAlphabet) -> N
     for look, symbols in enumerate(trials.symbols.transpose(1, 0, 2)):
         if look:
             own.act_apart(trials.actions[:, look - 1])
-        if (symbols != NOT_SEEN).all():
+        if (symbols != MISSING).all():
             own.observe_pattern(symbols)
         else:
-            agrees = (symbols[:, None, :] == NOT_SEEN) | (symbols[:, None, :] == alphabet.symbols)
+            agrees = (symbols[:, None, :] == MISSING) | (symbols[:, None, :] == alphabet.symbols)
             own.observe_likelihood(agrees.all(axis=2).astype(np.float64))
 
 

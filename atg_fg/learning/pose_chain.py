@@ -14,7 +14,8 @@ import numpy as np
 
 from atg_fg.core.errors import InvalidInputError, TooLargeError
 from atg_fg.core.patterns import Evidence, FloatArray, PatternAlphabet
-from atg_fg.inference.chain import Chain, History, forward_pass
+from atg_fg.inference.chain import Chain, forward_pass
+from atg_fg.inference.history import History
 from atg_fg.learning import register_contents as soft
 from atg_fg.learning.rates import Rates
 from atg_fg.learning.raw_trials import RawTrial

@@ -15,8 +15,8 @@ from typing import Final
 import numpy as np
 
 from atg_fg.core.assumptions import Assumptions
-from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.learning.raw_trials import NOT_SEEN, RawTrial, side_by_side
+from atg_fg.core.patterns import MISSING, FloatArray, IntArray
+from atg_fg.learning.raw_trials import RawTrial, side_by_side
 
 #: Nats that each pair costs that a register or a symbol has too many; about what a wrong look in one slot costs.
 PAIR_COST: Final = 6.0
@@ -40,7 +40,7 @@ class QuickScore:
         self._n_trials, self._n_slots, self._n_symbols = len(trials), len(alphabet.slots), alphabet.n_symbols
         # Where a trial has ended nothing moves: an action of its own, the identity, after all others.
         self._actions: IntArray = np.where(arrays.actions < 0, len(assumptions.actions), arrays.actions).T
-        self._seen = np.flatnonzero(symbols.ravel() != NOT_SEEN)
+        self._seen = np.flatnonzero(symbols.ravel() != MISSING)
         self._symbols = symbols.ravel()[self._seen]
         self._n_shown = np.array([len({s for look in t.detections for s in look} - {None}) for t in trials])
         logarithms = np.log(np.maximum(self._n_symbols - np.arange(self._n_symbols), 1))

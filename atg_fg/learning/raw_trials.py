@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.core.patterns import Detection, IntArray
-
-#: A slot in which nothing was seen.
-NOT_SEEN: Final = -1
+from atg_fg.core.patterns import MISSING, Detection, IntArray
 
 
 @dataclass(frozen=True)
@@ -52,7 +49,7 @@ class TrialArrays(NamedTuple):
     """N trials side by side, as long as the longest of them.
 
     Attributes:
-        symbols: Seen in each slot at each look, ``NOT_SEEN`` where nothing was or the trial has ended, [N, T + 1, J].
+        symbols: Seen in each slot at each look, ``MISSING`` where nothing was or the trial has ended, [N, T + 1, J].
         actions: Between the looks, −1 where the trial has ended, shape [N, T].
     """
 
@@ -64,10 +61,10 @@ def side_by_side(trials: Sequence[RawTrial]) -> TrialArrays:
     """Return trials, at least one, as arrays."""
     longest = max(len(trial.actions) for trial in trials)
     n_slots = len(trials[0].detections[0])
-    symbols = np.full((len(trials), longest + 1, n_slots), NOT_SEEN, dtype=np.int64)
+    symbols = np.full((len(trials), longest + 1, n_slots), MISSING, dtype=np.int64)
     actions = np.full((len(trials), longest), -1, dtype=np.int64)
     for number, trial in enumerate(trials):
-        seen = [[NOT_SEEN if symbol is None else symbol for symbol in look] for look in trial.detections]
+        seen = [[MISSING if symbol is None else symbol for symbol in look] for look in trial.detections]
         symbols[number, : len(seen)] = seen
         actions[number, : len(trial.actions)] = trial.actions
     return TrialArrays(symbols, actions)

@@ -33,7 +33,7 @@ def action_values(model: RecognitionModel, goal: Goal, horizon: int = HORIZON) -
         horizon: Iterations at most; a state from which the goal is farther costs this much.
     """
     ahead = _probability_ahead(model, goal)
-    values = np.zeros(model.base.shape)
+    values = np.zeros(model.base_row.shape)
     for _ in range(horizon):
         costs = 1.0 + _expected(model, values)
         updated = ahead * costs.min(axis=0)
@@ -47,7 +47,7 @@ def action_values(model: RecognitionModel, goal: Goal, horizon: int = HORIZON) -
 def _expected(model: RecognitionModel, values: FloatArray) -> FloatArray:
     """Return Σ_y p(y | x, a, i) V_i(y), shape [A, H, W]."""
     edges = model.edges
-    expected: FloatArray = model.stay * (model.base * values).sum(axis=1)[None, :, None]
+    expected: FloatArray = model.prior_weight * (model.base_row * values).sum(axis=1)[None, :, None]
     gained = model.edge_probability * values[edges.hypothesis, edges.target]
     np.add.at(expected, (edges.action, edges.hypothesis, edges.source), gained)
     return expected
@@ -58,5 +58,5 @@ def _probability_ahead(model: RecognitionModel, goal: Goal) -> FloatArray:
     shown = np.where(model.pattern_of >= 0, goal.patterns[model.pattern_of], False)
     ahead = np.where(shown, 0.0, 1.0)
     n_unknown = np.maximum(model.n_patterns - model.n_known, 1)
-    ahead[:, COLLECTION] = 1.0 - (model.unknown @ goal.patterns) / n_unknown
+    ahead[:, COLLECTION] = 1.0 - (model.lacks @ goal.patterns) / n_unknown
     return ahead

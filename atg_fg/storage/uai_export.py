@@ -13,8 +13,9 @@ import numpy as np
 
 from atg_fg.core.errors import TooLargeError
 from atg_fg.core.patterns import Evidence, FloatArray
-from atg_fg.inference.chain import Chain, History, build_chain
+from atg_fg.inference.chain import Chain, build_chain
 from atg_fg.inference.elimination.discrete_model import DiscreteModel, ModelFactor
+from atg_fg.inference.history import History
 from atg_fg.storage.scripted_trial import ScriptedTrial
 
 #: A file of so many numbers has some 350 MB.

@@ -3,18 +3,14 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from typing import Any, ClassVar, Final, TypeAlias
+from typing import Any, ClassVar, TypeAlias
 
 import gymnasium
 import numpy as np
 from gymnasium import spaces
 
 from atg_fg.core.errors import InvalidInputError, unknown_name
-from atg_fg.core.patterns import Detection, IntArray
-
-#: Entry of an observation for a slot where nothing was detected.
-MISSING: Final = -1
-
+from atg_fg.core.patterns import MISSING, Detection, IntArray
 
 World: TypeAlias = gymnasium.Env[IntArray, np.int64]
 

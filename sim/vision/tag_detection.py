@@ -9,10 +9,10 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
+from atg_fg.core.patterns import MISSING
 from atg_fg.senses.tag_drawing import draw_slots
 from atg_fg.senses.tags import DetectedTag, TagDetector, Tags, tag_facing
 from atg_fg.worlds.arcube import N_TAGS
-from atg_fg.worlds.base import MISSING
 from sim.bodies.cube import TAG_DICTIONARY, TAG_SIZE
 from sim.vision.camera import Camera
 

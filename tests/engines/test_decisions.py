@@ -11,6 +11,7 @@ from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, PatternAlphabet
+from atg_fg.engines import begin_trial
 from atg_fg.engines.bayes_filter import BayesFilter
 from atg_fg.engines.gtsam_cells import EdgesInto, RowKinds
 from atg_fg.engines.gtsam_elimination import GtsamElimination, HypotheticalFactors, TransitionFactors
@@ -131,9 +132,7 @@ def test_tables_that_learn_are_used_as_they_are_at_each_step(engine: str) -> Non
     assumptions = Assumptions(4, 3, ("push", "pull"), PatternAlphabet(("front", "top"), 3))
     memory = RobotMemory(assumptions, [graph(assumptions, "known", [(0, 1), (1, 0)], (0, 0, 1, 3), (0, 0, 0, 1))])
     looks = [(0, 1), (1, 0), (0, 1), (1, None), (0, 1), (1, 0)]
-    inference = {BayesFilter.name: BayesFilter, GtsamElimination.name: GtsamElimination}[engine](
-        memory, ModelParameters(0.5, 0.1, learn_in_trial=True)
-    )
+    inference = begin_trial(engine, memory, ModelParameters(0.5, 0.1, learn_in_trial=True))
     for number, look in enumerate(looks):
         if number:
             inference.act(number % 2)
@@ -153,9 +152,9 @@ def test_an_edge_seen_again_is_one_entry_that_counts_more() -> None:
 
 
 def test_aspects_from_which_an_action_was_counted_as_often_are_one_state() -> None:
-    stay = np.array([[[1.0, 0.5, 1.0, 0.5], [1.0, 0.25, 0.5, 1.0]]])  # one action, two objects
-    rows = RowKinds(stay)
-    assert rows.stay.tolist() == [[0.5, 0.25], [1.0, 0.5], [0.0, 1.0]]
+    prior_weight = np.array([[[1.0, 0.5, 1.0, 0.5], [1.0, 0.25, 0.5, 1.0]]])  # one action, two objects
+    rows = RowKinds(prior_weight)
+    assert rows.prior_weight.tolist() == [[0.5, 0.25], [1.0, 0.5], [0.0, 1.0]]
 
 
 def test_a_cell_has_one_state_for_no_edge_and_one_for_each_edge() -> None:

@@ -7,13 +7,13 @@ import pytest
 from atg_fg.core.assumptions import arcube_assumptions
 from atg_fg.core.errors import InvalidInputError, UnknownNameError
 from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.patterns import MISSING
 from atg_fg.experiments.exploration import complete_memory
 from atg_fg.experiments.recognition_agent import RecognitionAgent
 from atg_fg.policies import StoppingPolicy, make_policy
 from atg_fg.storage.presets import preset
 from atg_fg.worlds.arcube import make_arcubes
 from atg_fg.worlds.arcube_world import ARcubeWorld
-from atg_fg.worlds.base import MISSING
 from tests.small import trial
 
 CUBES = make_arcubes(6, seed=0)

@@ -47,14 +47,14 @@ def test_the_prior_is_one_share_an_object_and_u_shares_for_unseen(n_objects, n_r
 def test_the_first_aspect_is_each_known_one_equally_and_the_rest_the_collection_node() -> None:
     # G = 4: the known object has n = 2 and m = 2, unseen has m = 4.
     model = RecognitionModel(two_slot_memory(), ModelParameters())
-    table_is(model.base, [[F(2, 4), F(1, 4), F(1, 4)], [1, 0, 0]])
+    table_is(model.base_row, [[F(2, 4), F(1, 4), F(1, 4)], [1, 0, 0]])
 
 
 def test_a_full_graph_has_no_collection_node() -> None:
     assumptions = one_slot(3, 2, 2)
     memory = RobotMemory(assumptions, [graph(assumptions, "full", [(1,), (0,)])])
     model = RecognitionModel(memory, ModelParameters(1.0, 0.0))
-    table_is(model.base, [[0, F(1, 2), F(1, 2)], [1, 0, 0]])
+    table_is(model.base_row, [[0, F(1, 2), F(1, 2)], [1, 0, 0]])
     table_is(model.transition(0)[0, 1:], [[0, F(1, 2), F(1, 2)]] * 2)
 
 
@@ -110,7 +110,7 @@ def test_learning_gives_every_hypothesis_with_room_the_new_aspect_and_splits_its
     # "half" has found its G-th aspect, which takes all; unseen divides (1/2)/4 : (1/2)/4.
     table_is(revelation.shares, [1, F(1, 2)])
     assert model.n_known.tolist() == [2, 2, 1]
-    table_is(model.base, [[0, F(1, 2), F(1, 2)], [0, F(1, 2), F(1, 2)], [F(1, 2), F(1, 2), 0]])
+    table_is(model.base_row, [[0, F(1, 2), F(1, 2)], [0, F(1, 2), F(1, 2)], [F(1, 2), F(1, 2), 0]])
     # Seen again it is no news to anybody.
     assert model.learn(0, 0, 0) is None
     # C of unseen now has 3 patterns left: (1/2)/3 + (1/2)/4 for each.
@@ -167,7 +167,7 @@ def test_restricted_tables_are_those_of_the_hypotheses_that_are_left() -> None:
         table_is(part.transition(action), model.transition(action)[[0, 2, 3]])
     evidence = seen(assumptions, 3)
     table_is(part.likelihood(evidence), model.likelihood(evidence)[[0, 2, 3]])
-    mass = model.prior[:, None] * model.base
+    mass = model.prior[:, None] * model.base_row
     whole = pattern_table(model, next_pattern_joint(model, mass), np.arange(4))
     left = pattern_table(part, next_pattern_joint(part, mass[[0, 2, 3]]), np.arange(3))
     table_is(left, whole[:, [0, 2, 3]])

@@ -12,7 +12,8 @@ from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, PatternAlphabet
 from atg_fg.experiments.scores import summarise
 from atg_fg.experiments.table1 import TestPlan, run_test
-from atg_fg.inference.chain import History, build_chain, forward_pass
+from atg_fg.inference.chain import build_chain, forward_pass
+from atg_fg.inference.history import History
 from atg_fg.learning.duplicates import find_duplicates, log_evidence_of_counts, merge_duplicates, passages
 from atg_fg.learning.structured_memory import StructuredMemory
 from atg_fg.storage.memory_files import load_memory

@@ -8,8 +8,9 @@ import pytest
 
 from atg_fg.core.errors import InvalidInputError, TooLargeError
 from atg_fg.core.patterns import Evidence
-from atg_fg.inference.chain import History, forward_pass
+from atg_fg.inference.chain import forward_pass
 from atg_fg.inference.factor_graph import RecognitionGraph
+from atg_fg.inference.history import History
 from atg_fg.learning.pose_chain import completions, pose_chain
 from atg_fg.learning.pose_filter import PoseFilter
 from atg_fg.learning.rates import Rates

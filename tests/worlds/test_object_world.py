@@ -8,12 +8,11 @@ from gymnasium.utils.env_checker import check_env
 
 from atg_fg.core.assumptions import Assumptions, arcube_assumptions
 from atg_fg.core.errors import InvalidInputError, UnknownNameError
-from atg_fg.core.patterns import PatternAlphabet
+from atg_fg.core.patterns import MISSING, PatternAlphabet
 from atg_fg.experiments.table1 import TestPlan, run_test
 from atg_fg.experiments.trial import check_world
 from atg_fg.worlds.arcube import make_arcubes
 from atg_fg.worlds.arcube_world import ARcubeWorld
-from atg_fg.worlds.base import MISSING
 from atg_fg.worlds.finite_objects import FiniteObject, Mechanism, ObjectFamily
 from atg_fg.worlds.object_world import ObjectWorld, make_object_world
 from atg_fg.worlds.registry import (

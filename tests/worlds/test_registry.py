@@ -8,10 +8,10 @@ from gymnasium.utils.env_checker import check_env
 
 from atg_fg.core.assumptions import arcube_assumptions
 from atg_fg.core.errors import InvalidInputError, UnknownNameError
-from atg_fg.core.patterns import Evidence
+from atg_fg.core.patterns import MISSING, Evidence
 from atg_fg.worlds.arcube import SUCCESSORS, make_arcubes, shown_pattern
 from atg_fg.worlds.arcube_world import ARcubeWorld
-from atg_fg.worlds.base import MISSING, detection_of
+from atg_fg.worlds.base import detection_of
 from atg_fg.worlds.registry import make_world
 
 CUBES = make_arcubes(3, seed=1)

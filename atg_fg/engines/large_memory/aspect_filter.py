@@ -18,7 +18,7 @@ from atg_fg.core.compact.compact_memory import GraphArrays
 from atg_fg.core.log_math import log_of
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, FloatArray, IntArray
-from atg_fg.inference.chain import History
+from atg_fg.inference.history import History
 from atg_fg.inference.recognition_model import COLLECTION
 
 
@@ -27,12 +27,12 @@ class Hidden(NamedTuple):
 
     Attributes:
         number: How many they are.
-        stay: The share of their mass that takes part in the row's S = Σ_x b(x) stay(x).
+        prior_weight: The share of their mass that takes part in the row's S = Σ_x b(x) prior_weight(x).
         keep: The share of their mass that goes from one of them to another by counted edges.
     """
 
     number: FloatArray
-    stay: FloatArray
+    prior_weight: FloatArray
     keep: FloatArray
 
 
@@ -88,7 +88,7 @@ class AspectFilter:
         mass: p(X_t | row), shape [R, W].
         hidden_mass: p(X_t is hidden | row), shape [R].
         log_weight: ln p(row, z_0:t), shape [R].
-        stay: α/(c + α) of each aspect under each action, shape [A, R, W].
+        prior_weight: α/(c + α) of each aspect under each action, shape [A, R, W].
         edges: The counted transitions by action.
     """
 
@@ -123,14 +123,14 @@ class AspectFilter:
         rows = np.repeat(np.arange(self.n_rows), graphs.n_edges.astype(np.int64))
         source, target = rows * width + graphs.source + 1, rows * width + graphs.target + 1
         count = graphs.counts.astype(np.float64)
-        self.stay = np.ones((n_actions, self.n_rows, width))
+        self.prior_weight = np.ones((n_actions, self.n_rows, width))
         self.edges: list[CountedEdges] = []
         for action in range(n_actions):
             chosen = np.flatnonzero(graphs.action == action)
             from_cell, counted = source[chosen], count[chosen]
             totals = np.bincount(from_cell, counted, self.pattern.size)
             has = totals > 0
-            self.stay[action].ravel()[has] = alpha / (totals[has] + alpha)
+            self.prior_weight[action].ravel()[has] = alpha / (totals[has] + alpha)
             probability = counted / (totals[from_cell] + alpha)
             self.edges.append(CountedEdges(from_cell, target[chosen], counted, probability))
 
@@ -151,7 +151,7 @@ class AspectFilter:
         return unobserved
 
     @property
-    def unknown_rate(self) -> FloatArray:
+    def collection_rate(self) -> FloatArray:
         """p(z | C) without noise of each pattern that the row does not know, shape [R]."""
         n_unknown = np.maximum(self.n_patterns - self.n_known, 1)
         return np.where(self.n_unobserved > 0, (1.0 - self.parameters.observation_noise) / n_unknown, 0.0)
@@ -164,7 +164,7 @@ class AspectFilter:
 
     def predict(self, action: int) -> None:
         """Take in an action."""
-        kept = np.einsum("rw,rw->r", self.mass, self.stay[action]) + self.hidden.stay * self.hidden_mass
+        kept = np.einsum("rw,rw->r", self.mass, self.prior_weight[action]) + self.hidden.prior_weight * self.hidden_mass
         predicted = self.arrivals(action, self.mass)
         np.add(predicted, (kept / self.n_aspects)[:, None], out=predicted, where=self.pattern >= 0)
         predicted[:, COLLECTION] = kept * (self.n_unobserved / self.n_aspects)
@@ -190,7 +190,7 @@ class AspectFilter:
             unknown = np.full(self.n_rows, weight)
             unknown[rows] = 0.0
             mass[rows, states] += self.mass[rows, states] * ((1.0 - delta) * weight)
-        mass[:, COLLECTION] = self.mass[:, COLLECTION] * (self.unknown_rate * unknown + noise)
+        mass[:, COLLECTION] = self.mass[:, COLLECTION] * (self.collection_rate * unknown + noise)
         hidden_mass = self.hidden_mass * noise
         total = mass.sum(axis=1) + hidden_mass
         log_weight = self.log_weight + log_of(total)
@@ -219,7 +219,7 @@ class AspectFilter:
         rows = np.flatnonzero(~knows & (self.n_known < self.n_aspects))
         if not len(rows):
             return
-        truth = self.unknown_rate[rows]
+        truth = self.collection_rate[rows]
         noise = self.parameters.observation_noise / self.n_patterns
         last = self.n_known[rows] + 1 == self.n_aspects
         shares = np.where(last, 1.0, truth / (truth + noise))
@@ -240,7 +240,7 @@ class AspectFilter:
         more = ((0, 0), (0, width - old))
         self.pattern = np.pad(self.pattern, more, constant_values=-1)
         self.mass = np.pad(self.mass, more)
-        self.stay = np.pad(self.stay, ((0, 0), *more), constant_values=1.0)
+        self.prior_weight = np.pad(self.prior_weight, ((0, 0), *more), constant_values=1.0)
         self.edges = [edges.in_cells(old, width) for edges in self.edges]
 
     def _count(self, previous: int, action: int, pattern: int) -> None:
@@ -260,7 +260,7 @@ class AspectFilter:
         new = touched[source]
         totals[source[new]] += 1.0
         edges.probability[theirs] = edges.counts[theirs] / (totals[edges.source[theirs]] + alpha)
-        self.stay[action].ravel()[source] = alpha / (totals[source] + alpha)
+        self.prior_weight[action].ravel()[source] = alpha / (totals[source] + alpha)
         first = source[new]
         added = CountedEdges(first, target[new], np.ones(len(first)), 1.0 / (totals[first] + alpha))
         self.edges[action] = edges.followed_by(added)
@@ -272,22 +272,20 @@ class AspectFilter:
         cells[rows] = rows * self.width + states
         return cells
 
-    def follow(self, history: History, since: int = 0) -> None:
-        """Go through a trial from its beginning, or from after its first ``since`` looks."""
-        for time, evidence in enumerate(history.evidence[since:], start=since):
+    def follow(self, history: History, since: int = 0, until: int | None = None) -> None:
+        """Go through a trial from after its first ``since`` looks to its end, or to before its look at ``until``."""
+        end = len(history.evidence) if until is None else until
+        for time in range(since, end):
             if time:
                 self.predict(history.actions[time - 1])
-            self.accept(self.looked(evidence))
+            self.accept(self.looked(history.evidence[time]))
             self.learn_from(history, time)
-        if history.awaits_evidence and history.actions:
-            self.predict(history.actions[-1])
+        if 0 < end <= len(history.actions):
+            self.predict(history.actions[end - 1])
 
     def learn_from(self, history: History, time: int) -> None:
-        """Learn from the look at a time of a trial."""
-        if time:
-            self.learn(history.evidence[time - 1].pattern, history.actions[time - 1], history.evidence[time].pattern)
-        else:
-            self.learn(None, None, history.evidence[0].pattern)
+        """Learn from the look at a time of a trial, as ``RecognitionModel.learn_from`` does."""
+        self.learn(*history.step(time))
 
     def absorb(self, other: AspectFilter) -> None:
         """Add the rows of a filter that has gone through the same trial."""
@@ -299,7 +297,7 @@ class AspectFilter:
         for name in ("listed_rows", "listed_patterns", "n_known", "pattern", "mass", "hidden_mass", "log_weight"):
             setattr(self, name, np.concatenate((getattr(self, name), getattr(other, name))))
         self.hidden = Hidden(*(np.concatenate(pair) for pair in zip(self.hidden, other.hidden, strict=True)))
-        self.stay = np.concatenate((self.stay, other.stay), axis=1)
+        self.prior_weight = np.concatenate((self.prior_weight, other.prior_weight), axis=1)
         moved = [edges.in_cells(width, width, first_row) for edges in other.edges]
         self.edges = [edges.followed_by(more) for edges, more in zip(self.edges, moved, strict=True)]
 

@@ -96,7 +96,7 @@ def one_by_one(matched: AspectFilter, weights: FloatArray, *, exact: bool) -> Ne
         here = source // matched.width
         carried = matched.mass.ravel()[source] * edges.probability[chosen] * weights[here]
         here, target, carried = _grouped(here, source, target, carried)
-        stays = matched.mass.ravel()[followed.cells] * matched.stay[action].ravel()[followed.cells]
+        stays = matched.mass.ravel()[followed.cells] * matched.prior_weight[action].ravel()[followed.cells]
         leaves = np.zeros(matched.n_rows, dtype=bool)
         leaves[here] = True
         rows = np.flatnonzero(leaves)
@@ -121,7 +121,7 @@ class _RowValues:
         delta = matched.parameters.observation_noise
         self._noise = delta / matched.n_patterns * weights
         self._rate_known = (1.0 - delta) / matched.n_aspects
-        self._rate_unknown = matched.n_unobserved / matched.n_aspects * matched.unknown_rate
+        self._rate_unknown = matched.n_unobserved / matched.n_aspects * matched.collection_rate
         self._n_known, self._n_unknown = matched.n_known, matched.n_patterns - matched.n_known
 
     def of(self, kept: FloatArray, rows: IntArray | slice) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -181,7 +181,7 @@ def by_class(classes: NeverMatched, masses: ClassMasses) -> NextLooks:
     matched, members = classes.filter, classes.members
     delta, n_patterns = matched.parameters.observation_noise, matched.n_patterns
     noise = delta / n_patterns * masses.total
-    rate_known, rate_unknown = (1.0 - delta) / matched.n_aspects, classes.collection_share() * classes.unknown_rate()
+    rate_known, rate_unknown = (1.0 - delta) / matched.n_aspects, classes.collection_share() * classes.collection_rate()
     kept = classes.kept(masses)
     known, unknown = kept * rate_known + noise, kept * rate_unknown + noise
     more, without = known - unknown, x_log_x(known)

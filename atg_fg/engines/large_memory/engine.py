@@ -10,7 +10,6 @@ from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.compact.compact_memory import CompactMemory, GraphArrays
 from atg_fg.core.log_math import log_of, log_sum_exp
 from atg_fg.core.memory import RobotMemory
-from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, FloatArray, IntArray
 from atg_fg.engines.large_memory.aspect_filter import AspectFilter
 from atg_fg.engines.large_memory.decision import by_class, entropy_bound, expected_entropies, is_decided, one_by_one
@@ -18,8 +17,7 @@ from atg_fg.engines.large_memory.never_matched import ClassMasses, NeverMatched
 from atg_fg.engines.large_memory.tables_on_demand import TablesOnDemand
 from atg_fg.engines.options import whole_number
 from atg_fg.inference.chain import build_chain, forward_backward
-from atg_fg.inference.interface import Inference
-from atg_fg.inference.recognition_model import Revelation
+from atg_fg.inference.interface import Inference, TrialSetup
 
 #: So few objects are not worth an approximation.
 FEW: Final = 1000
@@ -62,30 +60,28 @@ class LargeMemory(Inference):
 
     def __init__(
         self,
-        memory: RobotMemory,
-        parameters: ModelParameters,
-        prior: IdentityBelief | None = None,
+        setup: TrialSetup,
         *,
         n_exact: int = 100,
     ) -> None:
-        super().__init__(memory, parameters, prior)
-        few = len(memory) <= whole_number("n_exact", n_exact, 0)
+        super().__init__(setup)
+        few = len(self.memory) <= whole_number("n_exact", n_exact, 0)
         of_objects = self.model.prior[:-1]
-        self._compact = CompactMemory.of(memory)
+        self._compact = CompactMemory.of(self.memory)
         self._log_total = 0.0
         self._decision: Decision | None = None
         self._all: AspectFilter | None = None
         self._n_followed = 0
         self._classes: NeverMatched | None = None
         #: index of the object in each row of ``_matched`` but the first, which is *unseen*
-        self._objects: IntArray = np.arange(len(memory))
+        self._objects: IntArray = np.arange(len(self.memory))
         if few or not (of_objects > 0).all() or (of_objects != of_objects[0]).any():
             self._matched = self._filter_of(self._objects, unseen=True)
             return
         self._objects = self._objects[:0]
         self._matched = self._filter_of(self._objects, unseen=True)
-        self._classes = NeverMatched(self._compact, parameters, float(np.log(of_objects[0])))
-        self._is_matched = np.zeros(len(memory), dtype=bool)
+        self._classes = NeverMatched(self._compact, self.parameters, float(np.log(of_objects[0])))
+        self._is_matched = np.zeros(len(self.memory), dtype=bool)
         self._class_of = self._classes.rows_of(self._compact.n_known).astype(np.int32)
 
     def _tables(self) -> TablesOnDemand:
@@ -101,25 +97,14 @@ class LargeMemory(Inference):
             graphs = GraphArrays(n_known, graphs.patterns, n_edges, *graphs[3:])
         return AspectFilter(self.memory.assumptions, self.parameters, graphs, log_of(self.model.prior[chosen]))
 
-    def observe(self, evidence: Evidence) -> None:
-        """Take in the evidence z_t of a look, then learn from it if the parameters say so.
-
-        Raises:
-            InvalidInputError: It is an action's turn, or the evidence is not over this alphabet.
-            ImpossibleEvidenceError: The evidence has probability zero under the model; nothing has changed.
-        """
-        super().observe(evidence)
-        time = len(self.history.evidence) - 1
-        for each in self._filters():
-            each.learn_from(self.history, time)
-
     def _filters(self) -> list[AspectFilter]:
         return [self._matched] if self._classes is None else [self._matched, self._classes.filter]
 
     def _look(self, evidence: Evidence) -> None:
         objects = self._first_matches(evidence)
         joining = self._filter_of(objects)
-        joining.follow(self.history)
+        time = len(self.history.evidence) - 1
+        joining.follow(self.history, until=time)
         looked = [each.looked(evidence) for each in (self._matched, joining)]
         log_weights = [each.log_weight for each in looked]
         classes = self._classes
@@ -143,6 +128,9 @@ class LargeMemory(Inference):
                 self._matched.absorb(joining)
         self._log_total = log_total
         self._decision = None
+        self._learn()
+        for each in self._filters():
+            each.learn_from(self.history, time)
 
     def _first_matches(self, evidence: Evidence) -> IntArray:
         """Return the objects that know a pattern which this look allows, and none of those before, shape [M]."""
@@ -155,7 +143,7 @@ class LargeMemory(Inference):
         first: IntArray = objects[~self._is_matched[objects]]
         return first
 
-    def _predict(self, action: int) -> None:
+    def _act(self, action: int) -> None:
         for each in self._filters():
             each.predict(action)
 
@@ -271,9 +259,3 @@ class LargeMemory(Inference):
         known = hypothesis < len(self._compact)
         alone = RobotMemory(self.memory.assumptions, [self._compact.graph(hypothesis)] if known else [])
         return forward_backward(build_chain(alone, self.parameters, self.history, [0]))
-
-    def _update(self, likelihood: FloatArray) -> None:
-        """Do nothing: ``_look`` takes in evidence without a table of likelihoods."""
-
-    def _divide(self, revelation: Revelation) -> None:
-        """Do nothing: the filters learn by themselves."""

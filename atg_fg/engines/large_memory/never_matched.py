@@ -116,7 +116,7 @@ class NeverMatched:
 
     def kept(self, masses: ClassMasses) -> FloatArray:
         """Return S of one object of each class under each action, [A, C]; its edges among hidden aspects left out."""
-        listed: FloatArray = np.einsum("cw,acw->ac", masses.mass, self.filter.stay[:, : self.n_classes])
+        listed: FloatArray = np.einsum("cw,acw->ac", masses.mass, self.filter.prior_weight[:, : self.n_classes])
         return listed + masses.hidden
 
     def arrivals(self, masses: ClassMasses) -> FloatArray:
@@ -139,9 +139,9 @@ class NeverMatched:
         """Return m/G of each class, shape [C]."""
         return self.filter.n_unobserved[: self.n_classes] / self.filter.n_aspects
 
-    def unknown_rate(self) -> FloatArray:
+    def collection_rate(self) -> FloatArray:
         """Return p(z | C) without noise of each class, shape [C]."""
-        return self.filter.unknown_rate[: self.n_classes]
+        return self.filter.collection_rate[: self.n_classes]
 
     def aspects_of_one(self, masses: ClassMasses, row: int) -> FloatArray:
         """Return p(X_t | O) of an object of a class: the collection node, the n hidden aspects alike, those found."""

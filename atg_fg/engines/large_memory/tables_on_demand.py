@@ -30,19 +30,7 @@ class TablesOnDemand(RecognitionModel):
     """
 
     def __init__(self, memory: RobotMemory, parameters: ModelParameters, prior: IdentityBelief | None = None) -> None:
-        assumptions = memory.assumptions
-        self.memory = memory
-        self.parameters = parameters
-        self.n_actions = len(assumptions.actions)
-        self.n_aspects = assumptions.n_aspects
-        self.n_patterns = len(assumptions.alphabet)
-        self.n_unseen = memory.n_unseen
-        self.n_hypotheses = len(memory) + 1
-        if prior is None:
-            self.prior = IdentityBelief.uniform(len(memory), self.n_unseen).probabilities
-        else:
-            prior.check(len(memory), self.n_unseen)
-            self.prior = prior.probabilities / prior.probabilities.sum()
+        self._set_sizes(memory, parameters, prior)
         self._given = prior
         self._put_off: list[tuple[int | None, int | None, int | None]] | None = []
 

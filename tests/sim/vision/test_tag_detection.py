@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
+from atg_fg.core.patterns import MISSING
 from atg_fg.senses.tags import DetectedTag, TagPose
-from atg_fg.worlds.base import MISSING
 from sim.bodies.cube import CUBE_CENTRE, CUBE_SIZE
 from sim.vision.camera import Camera, Light
 from sim.vision.tag_detection import detect_markers, detected_symbols, draw_detections, slot_markers

@@ -10,7 +10,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from atg_fg.core.errors import InvalidInputError, MissingDependencyError, UnknownNameError
-from atg_fg.worlds.base import MISSING
+from atg_fg.core.patterns import MISSING
 from atg_fg.worlds.registry import make_world
 from sim.worlds.rendered_world import RenderedARcubeWorld
 

@@ -10,13 +10,13 @@ from gymnasium.utils.env_checker import check_env
 from atg_fg.core.assumptions import arcube_assumptions
 from atg_fg.core.errors import InvalidInputError, UnknownNameError
 from atg_fg.core.memory import RobotMemory
+from atg_fg.core.patterns import MISSING
 from atg_fg.engines import begin_trial
 from atg_fg.experiments.table1 import TestPlan, run_test
 from atg_fg.experiments.trial import check_world, run_trial
 from atg_fg.policies import EntropyPolicy
 from atg_fg.storage.presets import preset
 from atg_fg.worlds.arcube import SUCCESSORS, rotation_of
-from atg_fg.worlds.base import MISSING
 from atg_fg.worlds.registry import make_world
 from sim.bodies.cube import CUBE_CENTRE
 from sim.vision.cube_pose import CubePose

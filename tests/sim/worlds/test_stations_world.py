@@ -6,9 +6,9 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from atg_fg.core.errors import InvalidInputError, UnknownNameError
+from atg_fg.core.patterns import MISSING
 from atg_fg.worlds.arcube import rotation_of
 from atg_fg.worlds.arcube_world import ARcubeWorld
-from atg_fg.worlds.base import MISSING
 from atg_fg.worlds.stations import AtStation, StationsWorld, make_stations
 from sim.bodies.cube import CUBE_SIZE
 from sim.bodies.rail import RAIL_FORCE, RAIL_SPEED
