@@ -25,7 +25,7 @@ from atg_fg.experiments.recognition_env import make_recognition_env
 from atg_fg.experiments.scores import TestResult, pooled_interval
 from atg_fg.experiments.table1 import TestPlan, run_test
 from atg_fg.policies import AgentPolicy, Policy, make_policy
-from atg_fg.policies.belief_features import TOP, BeliefSummary
+from atg_fg.policies.belief_features import TOP, BeliefFeatures
 from atg_fg.storage.presets import preset
 from atg_fg.worlds.arcube import ACTION_SOURCES
 
@@ -45,7 +45,7 @@ def trained(n_steps: int, *, expected_entropies: bool, seed: int = 0) -> AgentPo
     """Return PPO after ``n_steps`` actions, as a policy."""
     from stable_baselines3 import PPO
 
-    summary = BeliefSummary(arcube_assumptions(), expected_entropies=expected_entropies)
+    summary = BeliefFeatures(arcube_assumptions(), expected_entropies=expected_entropies)
     env = make_recognition_env(objects_seed=OBJECTS_SEED, n_actions=N_ACTIONS, reward="entropy", summary=summary)
     settings: dict[str, Any] = {"n_steps": 600, "batch_size": 100, "gamma": 0.0, "learning_rate": 1e-3}
     agent = PPO("MlpPolicy", env, seed=seed, device="cpu", **settings)

@@ -70,7 +70,7 @@ def table1(
     options.check_at_least(1, tests=tests, actions=actions, trials=trials, jobs=jobs)
     options.check_at_least(0, seed=seed)
     workers = options.check_executor_option(executor, jobs)
-    options.check_settled_option(settled)
+    options.check_entropy_option(settled)
     options.check_json_option(json_file)
     if resume and records is None:
         raise InvalidInputError("--resume: no records to go on from; expected --records with their folder")

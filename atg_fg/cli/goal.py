@@ -15,7 +15,7 @@ from atg_fg.display import figures
 from atg_fg.experiments.goal_scores import summarise
 from atg_fg.experiments.goals import COMPLETE, GoalPlan, run_goals, run_many, run_seed
 from atg_fg.policies import POLICIES
-from atg_fg.policies.goal import PLANNERS, SETTLED
+from atg_fg.policies.goal import ENTROPY_THRESHOLD, PLANNERS
 from atg_fg.storage.presets import preset as preset_named
 from atg_fg.worlds.base import World
 
@@ -40,7 +40,7 @@ def goal(
     ] = "declare",
     settled: Annotated[
         float, typer.Option(help="Entropy of identity below which a cube is recognised, nats.")
-    ] = SETTLED,
+    ] = ENTROPY_THRESHOLD,
     trials: Annotated[int, typer.Option(help="Runs, each with a memory, cubes and goals of its own.")] = 20,
     actions: Annotated[int, typer.Option(help="Actions on each cube, at most.")] = 40,
     seed: Annotated[int, typer.Option(help="Seed of all runs.")] = 0,

@@ -18,7 +18,7 @@ from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.engines import ENGINES, usual_engine
 from atg_fg.experiments.executors.base import EXECUTORS, check_executor, is_cluster
-from atg_fg.policies import POLICIES, check_settled
+from atg_fg.policies import POLICIES, check_entropy_threshold
 from atg_fg.storage import plain_files
 from atg_fg.storage.presets import PRESETS
 from atg_fg.worlds.base import probability_option
@@ -127,10 +127,10 @@ def check_executor_option(executor: str, jobs: int | None) -> int:
     return jobs or available_cpus()
 
 
-def check_settled_option(settled: float | None) -> None:
+def check_entropy_option(settled: float | None) -> None:
     """Refuse ``--settled`` if it is given and no finite entropy above 0."""
     if settled is not None:
-        check_settled(settled, "--settled")
+        check_entropy_threshold(settled, "--settled")
 
 
 def check_json_option(path: str | None) -> None:

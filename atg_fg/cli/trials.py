@@ -71,7 +71,7 @@ def trial(
     """
     options.check_at_least(1, actions=actions)
     options.check_at_least(0, seed=seed, cubes_seed=cubes_seed)
-    options.check_settled_option(settled)
+    options.check_entropy_option(settled)
     options.check_json_option(json_file)
     for path in (save_memory, record):
         if path is not None:

@@ -16,8 +16,8 @@ from atg_fg.core.log_math import log_of, log_sum_exp
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.patterns import Evidence, FloatArray
 from atg_fg.engines.bayes_filter import BayesFilter
-from atg_fg.inference.belief_components import LEAST_PROBABILITY, Situation, shown_patterns_of, situations_of
-from atg_fg.inference.belief_tree import ImaginedBelief
+from atg_fg.inference.belief_components import LEAST_PROBABILITY, BeliefComponent, components_of, shown_patterns_of
+from atg_fg.inference.belief_tree import BeliefNode
 from atg_fg.inference.chain import forward_backward
 from atg_fg.inference.interface import TrialSetup
 from atg_fg.inference.recognition_model import COLLECTION
@@ -112,13 +112,13 @@ class LearnedStructure(BayesFilter):
             np.add.at(joint, (rows, self.model.aspect_of[owners].ravel()), (belief[owners, None] * patterns).ravel())
         return joint
 
-    def situations(self) -> list[Situation]:
+    def belief_components(self) -> list[BeliefComponent]:
         """Return what the object may be, a plain ATG or a follower of a structure, and where in it the robot is."""
         beliefs = self._type_beliefs()
-        situations = situations_of(self.model, self._plain_aspects(beliefs))
+        components = components_of(self.model, self._plain_aspects(beliefs))
         for each, belief in zip(self._followed, beliefs[1:], strict=True):
-            situations += each.situations(belief)
-        return situations
+            components += each.components(belief)
+        return components
 
     def shown_patterns(self) -> FloatArray:
         """Return the probability of each pattern to be the one shown now, given all evidence, shape [|𝒵|].
@@ -136,15 +136,15 @@ class LearnedStructure(BayesFilter):
             shown += belief[owners] @ patterns
         return shown
 
-    def imagined(self) -> ImaginedBelief:
-        """Return the present belief as one to imagine actions and looks from; the trial is not changed by them.
+    def belief_tree(self) -> BeliefNode:
+        """Return the present belief as the root of a belief tree; the trial is not changed by what is asked of it.
 
         Raises:
             InvalidInputError: Asked before a look or between an action and its look.
         """
         if not self._followed:
-            return super().imagined()
-        self._check_looked("imagined")
+            return super().belief_tree()
+        self._check_looked("belief tree")
         beliefs = self._type_beliefs()
         following = [Following(each.filter, belief) for each, belief in zip(self._followed, beliefs[1:], strict=True)]
         return StructureBelief(
@@ -153,7 +153,7 @@ class LearnedStructure(BayesFilter):
 
     def _expected_entropies(self) -> FloatArray:
         """Return eq. 3 for each action, shape [A], from p(O, z | a) summed over types, poses and contents."""
-        return self.imagined().expected_entropies() if self._followed else super()._expected_entropies()
+        return self.belief_tree().expected_entropies() if self._followed else super()._expected_entropies()
 
     def _smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
         """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s, of plain ATGs and poses together.
@@ -200,20 +200,20 @@ class FollowedStructure:
         """Ln p(O, the object follows this structure, z_0:t | a_1:t), shape [H]."""
         return self._log_weights + self.filter.log_evidence
 
-    def situations(self, belief: FloatArray) -> list[Situation]:
-        """Return a situation for each probable object, with its poses as aspects.
+    def components(self, belief: FloatArray) -> list[BeliefComponent]:
+        """Return the component of each probable object, with its poses as aspects.
 
         Args:
             belief: p(O, the object follows this structure | z_0:t, a_1:t), shape [H].
         """
-        situations = []
+        components = []
         for hypothesis in np.flatnonzero(belief >= LEAST_PROBABILITY).tolist():
             contents = self.filter.learned_contents(hypothesis)
             if contents is not None:
                 graph = pose_graph(self._poses, contents, self._rates, self._alphabet)
                 poses = self.filter.poses_of(hypothesis)
-                situations.append(Situation(hypothesis, float(belief[hypothesis]), graph, poses))
-        return situations
+                components.append(BeliefComponent(hypothesis, float(belief[hypothesis]), graph, poses))
+        return components
 
     def observe(self, evidence: Evidence) -> None:
         """Take in the evidence of a look."""

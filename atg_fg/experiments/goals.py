@@ -26,7 +26,7 @@ from atg_fg.experiments.goal_scores import ServedObject, score, table_of_goals
 from atg_fg.experiments.trial import run_trial
 from atg_fg.inference.all_different import identity_given_others
 from atg_fg.policies import POLICIES, GoalPolicy, make_policy
-from atg_fg.policies.goal import PLANNERS, SETTLED, UNREACHABLE
+from atg_fg.policies.goal import ENTROPY_THRESHOLD, PLANNERS, UNREACHABLE
 from atg_fg.storage.checked_json import parse_json, plain_json
 from atg_fg.storage.plain_files import make_folder, read_gzipped_text, write_bytes_atomically
 from atg_fg.storage.trial_log import check_not_begun, summary_of
@@ -66,7 +66,7 @@ class GoalPlan:
     parameters: ModelParameters = field(default_factory=ModelParameters)
     planner: str = "attempts"
     unreachable: str = "declare"
-    settled: float = SETTLED
+    settled: float = ENTROPY_THRESHOLD
     n_stations: int = 3
     n_remembered: int = 20
     n_objects: int = 100

@@ -23,7 +23,7 @@ from atg_fg.experiments.scores import Score
 from atg_fg.experiments.trial import check_world, learn_from
 from atg_fg.inference.interface import Inference
 from atg_fg.learning.structured_memory import memory_for
-from atg_fg.policies.belief_features import BeliefSummary
+from atg_fg.policies.belief_features import BeliefFeatures
 from atg_fg.storage.presets import preset as preset_named
 from atg_fg.worlds.base import World, detection_of
 from atg_fg.worlds.registry import assumptions_of, make_world_with
@@ -59,7 +59,7 @@ class RecognitionEnv(gymnasium.Env[Summary, np.int64]):
         engine: Name of the inference engine.
         n_actions: Actions a trial.
         reward: What the agent is rewarded for.
-        summary: What the agent sees; a plain ``BeliefSummary`` if not given.
+        summary: What the agent sees; a plain ``BeliefFeatures`` if not given.
         learns: Whether the memory learns from each trial.
         n_trials: Trials after which the memory is as at first.
         made_from: The object that each ATG in ``memory`` was made from, by its name: what the world's ``info`` calls
@@ -81,7 +81,7 @@ class RecognitionEnv(gymnasium.Env[Summary, np.int64]):
         engine: str = "bayes-filter",
         n_actions: int = 10,
         reward: Reward = "success",
-        summary: BeliefSummary | None = None,
+        summary: BeliefFeatures | None = None,
         learns: bool = True,
         n_trials: int = 100,
         made_from: Mapping[str, object] | None = None,
@@ -101,7 +101,7 @@ class RecognitionEnv(gymnasium.Env[Summary, np.int64]):
         check_world(world, memory.assumptions)
         self.world, self.parameters, self.engine = world, parameters, engine
         self.n_actions, self.reward, self.learns, self.n_trials = n_actions, reward, learns, n_trials
-        self.summary = summary or BeliefSummary(memory.assumptions)
+        self.summary = summary or BeliefFeatures(memory.assumptions)
         self.observation_space = self.summary.space
         self._n_actions = len(memory.assumptions.actions)
         self.action_space = spaces.Discrete(self._n_actions)

@@ -1,6 +1,6 @@
 """What a planner needs of a belief: which objects there may be before the robot, and where it may be in what it knows.
 
-An engine with another model than plain ATGs overrides ``Inference.situations`` and ``Inference.shown_patterns``; the
+An engine with another model than plain ATGs overrides ``Inference.belief_components`` and ``Inference.shown_patterns``; the
 planners need not know.
 """
 
@@ -19,7 +19,7 @@ from atg_fg.inference.recognition_model import COLLECTION, RecognitionModel
 LEAST_PROBABILITY: Final = 1e-3
 
 
-class Situation(NamedTuple):
+class BeliefComponent(NamedTuple):
     """One thing that the object may be, and what is known of it.
 
     Attributes:
@@ -35,21 +35,21 @@ class Situation(NamedTuple):
     belief: Mapping[int, float]
 
 
-def situations_of(model: RecognitionModel, belief: FloatArray) -> list[Situation]:
-    """Return a situation for each hypothesis that is not improbable.
+def components_of(model: RecognitionModel, belief: FloatArray) -> list[BeliefComponent]:
+    """Return the component of each hypothesis that is not improbable.
 
     Args:
         model: The tables in force.
         belief: p(O, X_t | z_0:t, a_1:t), shape [H, W].
     """
     probabilities = belief.sum(axis=1)
-    situations = []
+    components = []
     for hypothesis in np.flatnonzero(probabilities >= LEAST_PROBABILITY).tolist():
         graph = transitions_of_hypothesis(model, hypothesis)
         given = belief[hypothesis] / probabilities[hypothesis]
         aspects = {aspect: float(given[aspect]) for aspect in graph}
-        situations.append(Situation(hypothesis, float(probabilities[hypothesis]), graph, aspects))
-    return situations
+        components.append(BeliefComponent(hypothesis, float(probabilities[hypothesis]), graph, aspects))
+    return components
 
 
 def shown_patterns_of(model: RecognitionModel, belief: FloatArray, evidence: Evidence) -> FloatArray:

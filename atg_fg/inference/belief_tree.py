@@ -1,7 +1,7 @@
-"""What a policy that looks ahead imagines: the belief after an action and each look that it may lead to.
+"""The belief tree of a policy that looks ahead: the belief after an action and each look that it may lead to.
 
-``ImaginedBelief`` and ``ImaginedLooks`` say what is asked; ``TableBelief`` and ``TableLooks`` answer from the model's
-tables. After action a and pattern z the belief is, up to a factor,
+``BeliefNode`` and ``Observations`` say what is asked; ``TableBeliefNode`` and ``TableObservations`` answer from the
+model's tables. After action a and pattern z the belief is, up to a factor,
 
     p(O = i, X' = y | z, a) ∝ p(i, y | a) · δ/|𝒵| + e_i(z) · [y = y_i(z)]
 
@@ -21,22 +21,22 @@ from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.inference.expected_entropy import NextPatternJoint, arrivals, expected_entropies, expected_entropies_of
 from atg_fg.inference.recognition_model import COLLECTION, RecognitionModel
 
-#: Hypotheses less probable than this, given what was imagined, are left out. What they add to an expected entropy,
+#: Hypotheses less probable than this, given the path from the root, are left out. What they add to an expected entropy,
 #: p ln p in all, is less than rounding does.
 _NEGLIGIBLE: Final = 1e-18
 
 
-class ImaginedBelief(Protocol):
+class BeliefNode(Protocol):
     """A belief over identity and present aspect that may come of a trial; nothing is learned any more."""
 
     def expected_entropies(self) -> FloatArray:
         """Return the expected entropy of identity after one more action (eq. 3) in nats, shape [A]."""
 
-    def after(self, action: int) -> ImaginedLooks:
+    def after(self, action: int) -> Observations:
         """Return what may be seen after an action."""
 
 
-class ImaginedLooks(Protocol):
+class Observations(Protocol):
     """The looks that an action may lead to; patterns that leave one and the same belief may be one of them."""
 
     @property
@@ -48,13 +48,13 @@ class ImaginedLooks(Protocol):
         """Return H(O | look, a) in nats, shape [L]."""
 
     def expected_entropies(self, looks: IntArray) -> FloatArray:
-        """Return ``ImaginedBelief.expected_entropies`` after each of some looks [N] of probability above 0, [N, A]."""
+        """Return ``BeliefNode.expected_entropies`` after each of some looks [N] of probability above 0, [N, A]."""
 
-    def belief(self, look: int) -> ImaginedBelief:
+    def belief(self, look: int) -> BeliefNode:
         """Return the belief after a look of probability above 0."""
 
 
-class TableBelief:
+class TableBeliefNode:
     """A belief on the tables in force.
 
     Args:
@@ -76,12 +76,12 @@ class TableBelief:
         """Return the expected entropy of identity after one more action (eq. 3) in nats, shape [A]."""
         return expected_entropies_of(self._model, self._mass)
 
-    def after(self, action: int) -> TableLooks:
+    def after(self, action: int) -> TableObservations:
         """Return what may be seen after an action."""
-        return TableLooks(self._model, self._model.predict(self._mass, action))
+        return TableObservations(self._model, self._model.predict(self._mass, action))
 
 
-class TableLooks:
+class TableObservations:
     """Looks on the tables in force: one for each pattern that some object knows, and one for all others.
 
     Args:
@@ -133,11 +133,11 @@ class TableLooks:
         # Both sides are weighted by p(look | a): no belief is normalised.
         return expected_entropies(model, joint, self._joint[looks, -1][:, None]) / self.probabilities[looks][:, None]
 
-    def belief(self, look: int) -> TableBelief:
+    def belief(self, look: int) -> TableBeliefNode:
         """Return the belief after a look of probability above 0."""
         mass = self._share[look] * self._shared
         mass[np.arange(self._model.n_hypotheses), self._states[:, look]] += self._own[:, look]
-        return TableBelief(self._model, mass / mass.sum())
+        return TableBeliefNode(self._model, mass / mass.sum())
 
     def _kept(self, looks: IntArray) -> FloatArray:
         """Return the mass, with each look, that the next action's rows leave to their base, shape [N, A, H]."""

@@ -14,8 +14,8 @@ from atg_fg.core.errors import ImpossibleEvidenceError, InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, FloatArray
-from atg_fg.inference.belief_components import Situation, shown_patterns_of, situations_of
-from atg_fg.inference.belief_tree import ImaginedBelief, TableBelief
+from atg_fg.inference.belief_components import BeliefComponent, components_of, shown_patterns_of
+from atg_fg.inference.belief_tree import BeliefNode, TableBeliefNode
 from atg_fg.inference.chain import Chain, build_chain
 from atg_fg.inference.history import History
 from atg_fg.inference.recognition_model import RecognitionModel, Revelation
@@ -118,9 +118,9 @@ class Inference(ABC):
         """
         return self.identity().named(self.memory.names, shown)
 
-    def situations(self) -> list[Situation]:
+    def belief_components(self) -> list[BeliefComponent]:
         """Return what the object may be, and where in it the robot may be; improbable ones are left out."""
-        return situations_of(self.model, self.aspect_belief)
+        return components_of(self.model, self.aspect_belief)
 
     def shown_patterns(self) -> FloatArray:
         """Return the probability of each pattern to be the one shown now, given all evidence, shape [|𝒵|].
@@ -131,16 +131,16 @@ class Inference(ABC):
         self._check_looked("shown patterns")
         return shown_patterns_of(self.model, self.aspect_belief, self.history.evidence[-1])
 
-    def imagined(self) -> ImaginedBelief:
-        """Return the present belief as one to imagine actions and looks from; the trial is not changed by them.
+    def belief_tree(self) -> BeliefNode:
+        """Return the present belief as the root of a belief tree; the trial is not changed by what is asked of it.
 
         An engine that does not predict by the model's tables overrides this.
 
         Raises:
             InvalidInputError: Asked before a look or between an action and its look.
         """
-        self._check_looked("imagined")
-        return TableBelief(self.model, self.aspect_belief)
+        self._check_looked("belief tree")
+        return TableBeliefNode(self.model, self.aspect_belief)
 
     def chain(self, hypothesis: int | None = None) -> Chain:
         """Return the trial so far as plain arrays, for all hypotheses or under one of them."""

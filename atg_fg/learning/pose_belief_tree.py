@@ -1,4 +1,4 @@
-"""What a policy imagines where objects may follow structures: the belief after an action and each look.
+"""The belief tree where objects may follow structures: the belief after an action and each look.
 
 It answers as ``atg_fg.inference.belief_tree`` does for plain ATGs, from the same filters that follow the trial. What a
 look would reveal of an object's contents is taken into account; nothing is counted into ATGs any more.

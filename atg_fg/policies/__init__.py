@@ -13,7 +13,7 @@ from atg_fg.policies.exploration import ExplorationPolicy
 from atg_fg.policies.goal import GoalPolicy
 from atg_fg.policies.information_gain import EntropyPolicy, RandomPolicy
 from atg_fg.policies.lookahead import LookaheadPolicy
-from atg_fg.policies.stopping import StoppingPolicy, check_settled
+from atg_fg.policies.stopping import StoppingPolicy, check_entropy_threshold
 
 __all__ = [
     "POLICIES",
@@ -28,7 +28,7 @@ __all__ = [
     "SampledPolicy",
     "StoppingPolicy",
     "as_policy",
-    "check_settled",
+    "check_entropy_threshold",
     "make_policy",
 ]
 
@@ -43,20 +43,20 @@ POLICIES: Final[dict[str, Callable[[], Policy]]] = {
 }
 
 
-def make_policy(name: str, settled: float | None = None) -> Policy:
+def make_policy(name: str, entropy_threshold: float | None = None) -> Policy:
     """Return the policy named ``name``.
 
     Args:
         name: In ``POLICIES``, or ``module:object`` of a user's own: a policy, an agent with ``predict``, or a space of
             actions.
-        settled: Entropy of the verdict in nats at which the policy ends the trial; it never does if not given.
+        entropy_threshold: Entropy of the verdict in nats at which the policy ends the trial; it never does if not given.
 
     Raises:
         UnknownNameError: There is no such policy.
-        InvalidInputError: The user's own cannot be imported, or is no policy; or ``settled`` is not a finite entropy
+        InvalidInputError: The user's own cannot be imported, or is no policy; or the threshold is not a finite entropy
             above 0.
     """
     if name not in POLICIES and ":" not in name:
         raise unknown_name("policy", name, POLICIES)
     policy = POLICIES[name]() if name in POLICIES else imported_policy(name)
-    return policy if settled is None else StoppingPolicy(policy, settled)
+    return policy if entropy_threshold is None else StoppingPolicy(policy, entropy_threshold)

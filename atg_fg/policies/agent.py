@@ -11,7 +11,7 @@ import numpy as np
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.inference.interface import Inference
 from atg_fg.policies.base import Choice, Policy
-from atg_fg.policies.belief_features import BeliefSummary
+from atg_fg.policies.belief_features import BeliefFeatures
 
 
 class Agent(Protocol):
@@ -27,7 +27,7 @@ class AgentPolicy:
     Args:
         agent: Anything with ``predict(observation, deterministic=True)``, such as a model of Stable-Baselines3 that
             was trained on a ``RecognitionEnv``. It must keep no state of its own from look to look.
-        summary: What the agent sees; a plain ``BeliefSummary`` of the memory's assumptions if not given.
+        summary: What the agent sees; a plain ``BeliefFeatures`` of the memory's assumptions if not given.
 
     Raises:
         InvalidInputError: The agent has no ``predict``.
@@ -35,7 +35,7 @@ class AgentPolicy:
 
     name: ClassVar[str] = "agent"
 
-    def __init__(self, agent: Agent, summary: BeliefSummary | None = None) -> None:
+    def __init__(self, agent: Agent, summary: BeliefFeatures | None = None) -> None:
         if not callable(getattr(agent, "predict", None)):
             raise InvalidInputError(f"agent: {agent!r}; expected an object with predict(observation, deterministic)")
         self.agent, self.summary = agent, summary
@@ -52,8 +52,8 @@ class AgentPolicy:
             raise InvalidInputError(f"agent: {self.agent!r} keeps a state; expected one that goes by what it sees")
         return Choice(_action(action, inference.model.n_actions), None)
 
-    def _summary_for(self, inference: Inference) -> BeliefSummary:
-        summary = self.summary or BeliefSummary(inference.memory.assumptions)
+    def _summary_for(self, inference: Inference) -> BeliefFeatures:
+        summary = self.summary or BeliefFeatures(inference.memory.assumptions)
         expected = getattr(getattr(self.agent, "observation_space", None), "shape", None)
         if expected is not None and tuple(expected) != summary.space.shape:
             raise InvalidInputError(

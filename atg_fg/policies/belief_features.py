@@ -21,7 +21,7 @@ TOP: Final = 5
 _NO_GAIN: Final = 1e-9
 
 
-class BeliefSummary:
+class BeliefFeatures:
     """The state of a trial after a look as a vector of fixed length, every entry from 0 to 1.
 
     Its entries, in this order:
@@ -60,20 +60,20 @@ class BeliefSummary:
 
     @property
     def space(self) -> spaces.Space[NDArray[np.float32]]:
-        """The gymnasium space of all summaries."""
+        """The gymnasium space of all features."""
         box: spaces.Space[Any] = spaces.Box(0.0, 1.0, (self.length,), np.float32)
         return box
 
     def of(self, inference: Inference) -> NDArray[np.float32]:
-        """Return the summary of a trial after a look, shape [``length``].
+        """Return the features of a trial after a look, shape [``length``].
 
         Raises:
             InvalidInputError: The trial is under other assumptions, or before a look.
         """
         if inference.memory.assumptions != self.assumptions:
-            raise InvalidInputError("belief summary: the trial is under other assumptions than the summary")
+            raise InvalidInputError("belief features: the trial is under other assumptions than they are")
         if inference.history.awaits_evidence:
-            raise InvalidInputError("belief summary: asked before the look; expected an observation first")
+            raise InvalidInputError("belief features: asked before the look; expected an observation first")
         belief = inference.identity()
         best = np.zeros(self.top)
         found = np.sort(belief.objects)[::-1][: self.top]

@@ -1,14 +1,15 @@
-"""Acting on a belief: what each first action costs in whatever situation there may be, and the best of them."""
+"""Acting on a belief: what each first action costs in each component of the belief, and the best of them."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from atg_fg.core.patterns import FloatArray
-from atg_fg.inference.belief_components import Situation
+from atg_fg.inference.interface import Inference
+from atg_fg.inference.known_transitions import TransitionGraph
 from atg_fg.policies.base import one_of_the_best
 
 #: What an action costs of which no known path leads on: as much as a cube has aspects. More than any known path in an
@@ -16,11 +17,11 @@ from atg_fg.policies.base import one_of_the_best
 NO_PATH_COST: Final = 24.0
 
 
-class Outlook(NamedTuple):
-    """What the robot is to expect of its actions in one situation.
+class ExpectedCosts(NamedTuple):
+    """What the first actions cost in one component of the belief.
 
     Attributes:
-        probability: Of the situation.
+        probability: Of the component.
         belief: Probability of each aspect in it; improbable ones may be left out.
         costs: Of each first action from each aspect, shape [A]; ∞ where no known path leads on.
     """
@@ -29,28 +30,30 @@ class Outlook(NamedTuple):
     belief: Mapping[int, float]
     costs: Mapping[int, FloatArray]
 
-    @classmethod
-    def on(cls, situation: Situation, costs: Mapping[int, FloatArray]) -> Outlook:
-        """Return the outlook of a situation with these costs."""
-        return cls(situation.probability, situation.belief, costs)
-
     @property
     def share_with_a_path(self) -> float:
         """Probability to be at an aspect from which some action leads on."""
         return sum(each for aspect, each in self.belief.items() if np.isfinite(self.costs[aspect]).any())
 
 
-def share_with_a_path(outlooks: Sequence[Outlook]) -> float:
+def by_component(
+    inference: Inference, costs: Callable[[TransitionGraph], Mapping[int, FloatArray]]
+) -> list[ExpectedCosts]:
+    """Return the costs in each component of a belief, from a function of the transitions that are known there."""
+    return [ExpectedCosts(each.probability, each.belief, costs(each.graph)) for each in inference.belief_components()]
+
+
+def share_with_a_path(components: Sequence[ExpectedCosts]) -> float:
     """Return the share of all probability that is where some action leads on."""
-    total = sum(outlook.probability for outlook in outlooks)
-    led_on = sum(outlook.probability * outlook.share_with_a_path for outlook in outlooks)
+    total = sum(component.probability for component in components)
+    led_on = sum(component.probability * component.share_with_a_path for component in components)
     return led_on / total if total > 0 else 0.0
 
 
-def best_by_expectation(outlooks: Sequence[Outlook], n_actions: int, rng: np.random.Generator) -> int:
+def best_by_expectation(components: Sequence[ExpectedCosts], n_actions: int, rng: np.random.Generator) -> int:
     """Return an action of least expected cost; ties are broken at random."""
     expected = np.zeros(n_actions)
-    for outlook in outlooks:
-        for aspect, probability in outlook.belief.items():
-            expected += outlook.probability * probability * np.minimum(outlook.costs[aspect], NO_PATH_COST)
+    for component in components:
+        for aspect, probability in component.belief.items():
+            expected += component.probability * probability * np.minimum(component.costs[aspect], NO_PATH_COST)
     return one_of_the_best(expected, rng)

@@ -8,7 +8,7 @@ import numpy as np
 
 from atg_fg.inference.interface import Inference
 from atg_fg.policies.base import Choice
-from atg_fg.policies.expected_costs import Outlook, best_by_expectation
+from atg_fg.policies.expected_costs import ExpectedCosts, best_by_expectation, by_component
 from atg_fg.policies.shortest_paths import exploration_costs
 
 
@@ -19,13 +19,10 @@ class ExplorationPolicy:
 
     def choose(self, inference: Inference, rng: np.random.Generator) -> Choice:
         """Return the first action on the way to something new."""
-        return Choice(best_by_expectation(outlooks_on_the_new(inference), inference.model.n_actions, rng), None)
+        return Choice(best_by_expectation(exploration_costs_of(inference), inference.model.n_actions, rng), None)
 
 
-def outlooks_on_the_new(inference: Inference) -> list[Outlook]:
-    """Return what it costs, in each situation, to try something new by each first action."""
+def exploration_costs_of(inference: Inference) -> list[ExpectedCosts]:
+    """Return what it costs, in each component of the belief, to try something new by each first action."""
     n_actions = inference.model.n_actions
-    return [
-        Outlook.on(situation, exploration_costs(situation.graph, n_actions, "attempts"))
-        for situation in inference.situations()
-    ]
+    return by_component(inference, lambda graph: exploration_costs(graph, n_actions, "attempts"))

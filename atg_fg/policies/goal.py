@@ -12,8 +12,8 @@ from atg_fg.core.goals import Goal
 from atg_fg.inference.belief_components import LEAST_PROBABILITY
 from atg_fg.inference.interface import Inference
 from atg_fg.policies.base import Choice
-from atg_fg.policies.expected_costs import Outlook, best_by_expectation, share_with_a_path
-from atg_fg.policies.exploration import outlooks_on_the_new
+from atg_fg.policies.expected_costs import ExpectedCosts, best_by_expectation, by_component, share_with_a_path
+from atg_fg.policies.exploration import exploration_costs_of
 from atg_fg.policies.information_gain import EntropyPolicy
 from atg_fg.policies.shortest_paths import COSTS, action_costs, goal_aspects
 from atg_fg.policies.value_iteration import action_values
@@ -22,13 +22,13 @@ from atg_fg.policies.value_iteration import action_values
 UNREACHABLE: Final = ("declare", "explore")
 
 #: Entropy of O below which an object is recognised, nats: then, if the belief is right, about one in 750 is another.
-SETTLED: Final = 0.01
+ENTROPY_THRESHOLD: Final = 0.01
 
 #: Where no action is expected to lower the entropy of identity by this much, nats, there is nothing to recognise by.
 LEAST_GAIN: Final = 1e-4
 
-#: Returns the costs of reaching a goal by each first action, in each situation.
-Planner: TypeAlias = Callable[[Inference, Goal], list[Outlook]]
+#: Returns the costs of reaching a goal by each first action, in each component of the belief.
+Planner: TypeAlias = Callable[[Inference, Goal], list[ExpectedCosts]]
 
 
 class ShortestPaths:
@@ -43,23 +43,20 @@ class ShortestPaths:
             raise unknown_name("cost of a path", cost, COSTS)
         self.cost = cost
 
-    def __call__(self, inference: Inference, goal: Goal) -> list[Outlook]:
-        """Return the outlook of each situation."""
+    def __call__(self, inference: Inference, goal: Goal) -> list[ExpectedCosts]:
+        """Return the costs in each component of the belief."""
         n_actions = inference.model.n_actions
-        return [
-            Outlook.on(
-                situation, action_costs(situation.graph, goal_aspects(situation.graph, goal), n_actions, self.cost)
-            )
-            for situation in inference.situations()
-        ]
+        return by_component(
+            inference, lambda graph: action_costs(graph, goal_aspects(graph, goal), n_actions, self.cost)
+        )
 
 
-def value_iteration(inference: Inference, goal: Goal) -> list[Outlook]:
-    """Return QMDP's values as outlooks; none is infinite, since it counts on the unknown. It knows plain ATGs only."""
+def value_iteration(inference: Inference, goal: Goal) -> list[ExpectedCosts]:
+    """Return QMDP's values; none is infinite, since it counts on the unknown. It knows plain ATGs only."""
     values, belief = action_values(inference.model, goal), inference.aspect_belief
     probabilities = belief.sum(axis=1)
     return [
-        Outlook(
+        ExpectedCosts(
             float(probabilities[hypothesis]),
             dict(enumerate((belief[hypothesis] / probabilities[hypothesis]).tolist())),
             dict(enumerate(values[:, hypothesis].T)),
@@ -88,7 +85,7 @@ class GoalPolicy:
         planner: Name in ``PLANNERS``.
         unreachable: Whether a goal that no known path leads to ends the trial, or is looked for by trying what was
             never tried.
-        settled: Entropy of O, with *unseen* as one state, below which the object is recognised, nats.
+        entropy_threshold: Entropy of O, with *unseen* as one state, below which the object is recognised, nats.
         confidence: Probability with which the goal must be shown for the trial to end.
 
     Raises:
@@ -102,20 +99,20 @@ class GoalPolicy:
         goal: Goal,
         planner: str = "attempts",
         unreachable: str = "declare",
-        settled: float = SETTLED,
+        entropy_threshold: float = ENTROPY_THRESHOLD,
         confidence: float = 0.95,
     ) -> None:
         if planner not in PLANNERS:
             raise unknown_name("planner", planner, PLANNERS)
         if unreachable not in UNREACHABLE:
             raise unknown_name("unreachable", unreachable, UNREACHABLE)
-        if not settled > 0:
-            raise InvalidInputError(f"settled: {settled!r}; expected an entropy above 0 nats")
+        if not entropy_threshold > 0:
+            raise InvalidInputError(f"entropy_threshold: {entropy_threshold!r}; expected an entropy above 0 nats")
         if not 0.5 < confidence < 1:
             raise InvalidInputError(f"confidence: {confidence!r}; expected a probability from above 0.5 to below 1")
         self.goal = goal
         self.unreachable = unreachable
-        self.settled = settled
+        self.entropy_threshold = entropy_threshold
         self.confidence = confidence
         self._planner = PLANNERS[planner]()
         self._recognition = EntropyPolicy()
@@ -124,17 +121,17 @@ class GoalPolicy:
         """Return the next action, or none with purpose ``reached`` or ``unreachable``."""
         if self.is_reached(inference):
             return Choice(None, None, "reached")
-        if inference.identity().entropy_of_verdict > self.settled:
+        if inference.identity().entropy_of_verdict > self.entropy_threshold:
             informative = self._recognition.choose(inference, rng)
             if expected_gain(inference, informative) > LEAST_GAIN:
                 return informative._replace(purpose="recognise")
         n_actions = inference.model.n_actions
-        outlooks = self._planner(inference, self.goal)
-        if share_with_a_path(outlooks) > 0.5:
-            return Choice(best_by_expectation(outlooks, n_actions, rng), None, "approach")
+        components = self._planner(inference, self.goal)
+        if share_with_a_path(components) > 0.5:
+            return Choice(best_by_expectation(components, n_actions, rng), None, "approach")
         if self.unreachable == "declare":
             return Choice(None, None, "unreachable")
-        return Choice(best_by_expectation(outlooks_on_the_new(inference), n_actions, rng), None, "explore")
+        return Choice(best_by_expectation(exploration_costs_of(inference), n_actions, rng), None, "explore")
 
     def is_reached(self, inference: Inference) -> bool:
         """Whether the goal is shown now, with the confidence asked for."""

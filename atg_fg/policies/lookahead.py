@@ -9,7 +9,7 @@ import numpy as np
 
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.inference.belief_tree import ImaginedBelief, ImaginedLooks
+from atg_fg.inference.belief_tree import BeliefNode, Observations
 from atg_fg.inference.expected_entropy import TIE_TOLERANCE
 from atg_fg.inference.interface import Inference
 from atg_fg.policies.base import Choice, one_of_the_best
@@ -76,10 +76,10 @@ class LookaheadPolicy:
         No more looks are followed than the decision needs: the two are the same, up to rounding, if it needs all.
         """
         weights = [*(weight for weight in _WEIGHTS if weight > self.least_weight), self.least_weight]
-        return bounds_ahead(inference.imagined(), self.horizon, weights)
+        return bounds_ahead(inference.belief_tree(), self.horizon, weights)
 
 
-def bounds_ahead(belief: ImaginedBelief, horizon: int, weights: Sequence[float]) -> Bounds:
+def bounds_ahead(belief: BeliefNode, horizon: int, weights: Sequence[float]) -> Bounds:
     """Return the bounds of V_horizon by first action.
 
     Args:
@@ -113,7 +113,7 @@ class _Branch:
         least_weight: Looks of less weight, then or later, are not followed, nats.
     """
 
-    def __init__(self, looks: ImaginedLooks, horizon: int, least_weight: float) -> None:
+    def __init__(self, looks: Observations, horizon: int, least_weight: float) -> None:
         self._looks = looks
         self._horizon = horizon
         self._least_weight = least_weight

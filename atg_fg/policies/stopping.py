@@ -17,31 +17,31 @@ class StoppingPolicy:
 
     Args:
         policy: Chooses the actions.
-        settled: Entropy of O in nats, with *unseen* as one state, at which the trial ends or below which.
+        entropy_threshold: The trial ends when the entropy of O, with *unseen* as one state, is at most this, nats.
 
     Raises:
-        InvalidInputError: ``settled`` is not a finite entropy above 0.
+        InvalidInputError: The threshold is not a finite entropy above 0.
     """
 
     name: ClassVar[str] = "stopping"
 
-    def __init__(self, policy: Policy, settled: float) -> None:
+    def __init__(self, policy: Policy, entropy_threshold: float) -> None:
         self.policy = policy
-        self.settled = check_settled(settled, "settled")
+        self.entropy_threshold = check_entropy_threshold(entropy_threshold, "entropy_threshold")
 
     def choose(self, inference: Inference, rng: np.random.Generator) -> Choice:
         """Return the next action, or none with purpose ``settled``."""
-        if inference.identity().entropy_of_verdict <= self.settled:
+        if inference.identity().entropy_of_verdict <= self.entropy_threshold:
             return Choice(None, None, "settled")
         return self.policy.choose(inference, rng)
 
 
-def check_settled(settled: float, place: str) -> float:
-    """Return an entropy below which a verdict is settled.
+def check_entropy_threshold(threshold: float, place: str) -> float:
+    """Return a threshold of entropy.
 
     Raises:
         InvalidInputError: Not a finite number above 0; the message begins with ``place``.
     """
-    if not 0 < settled < math.inf:
-        raise InvalidInputError(f"{place}: {settled!r}; expected a finite entropy above 0 nats")
-    return settled
+    if not 0 < threshold < math.inf:
+        raise InvalidInputError(f"{place}: {threshold!r}; expected a finite entropy above 0 nats")
+    return threshold

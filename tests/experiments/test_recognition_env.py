@@ -13,7 +13,7 @@ from atg_fg.experiments.exploration import complete_memory
 from atg_fg.experiments.recognition_env import RecognitionEnv, make_recognition_env
 from atg_fg.experiments.trial import run_trial
 from atg_fg.policies import Choice, as_policy
-from atg_fg.policies.belief_features import BeliefSummary
+from atg_fg.policies.belief_features import BeliefFeatures
 from atg_fg.storage.presets import preset
 from atg_fg.worlds.arcube import make_arcubes
 from atg_fg.worlds.arcube_world import ARcubeWorld
@@ -184,7 +184,7 @@ def test_as_a_policy_an_agent_sees_what_it_saw_in_training():
 
 
 def test_a_summary_of_ones_own_is_what_is_seen():
-    summary = BeliefSummary(arcube_assumptions(), top=2, expected_entropies=False)
+    summary = BeliefFeatures(arcube_assumptions(), top=2, expected_entropies=False)
     env = make_recognition_env(summary=summary)
     assert env.reset(seed=0)[0].shape == env.observation_space.shape == (2 + 3 + 24,)
 

@@ -29,17 +29,17 @@ def looked(memory, parameters, *detections, engine="bayes-filter"):
 
 def test_where_all_is_known_the_robot_is_at_the_aspect_it_sees():
     inference = looked(complete_memory(arcube_assumptions(3), CUBES), ModelParameters(), shown_pattern(CUBES[1], 7))
-    (situation,) = (each for each in inference.situations() if each.hypothesis == 1)
-    assert situation.belief[1 + 7] == pytest.approx(1.0, abs=1e-6)
-    assert situation.graph.number_of_edges() == 72
+    (component,) = (each for each in inference.belief_components() if each.hypothesis == 1)
+    assert component.belief[1 + 7] == pytest.approx(1.0, abs=1e-6)
+    assert component.graph.number_of_edges() == 72
 
 
 def test_probabilities_are_those_of_the_belief_over_identity():
     inference = looked(PARTIAL, ModelParameters(0.1, 0.1), (3, None))
     probabilities = inference.identity().probabilities
-    for situation in inference.situations():
-        assert situation.probability == pytest.approx(probabilities[situation.hypothesis], abs=1e-12)
-        assert sum(situation.belief.values()) <= 1 + 1e-12
+    for component in inference.belief_components():
+        assert component.probability == pytest.approx(probabilities[component.hypothesis], abs=1e-12)
+        assert sum(component.belief.values()) <= 1 + 1e-12
 
 
 @pytest.mark.parametrize("learn", [True, False])
@@ -68,7 +68,7 @@ def test_exact_engines_agree(engine):
     parameters = ModelParameters(0.1, 0.2)
     ours, theirs = (looked(PARTIAL, parameters, (3, 4), (4, None), engine=each) for each in (engine, "bayes-filter"))
     assert np.abs(ours.shown_patterns() - theirs.shown_patterns()).max() < 1e-12
-    for first, second in zip(ours.situations(), theirs.situations(), strict=True):
+    for first, second in zip(ours.belief_components(), theirs.belief_components(), strict=True):
         assert first.probability == pytest.approx(second.probability, abs=1e-12)
         assert dict(first.belief) == pytest.approx(dict(second.belief), abs=1e-12)
 

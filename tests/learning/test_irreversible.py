@@ -68,7 +68,7 @@ def test_the_lid_of_an_opened_box_is_out_of_reach(memory, believed, is_opened, p
     box, (lid_tag, _) = BOXES[number], tops_of(BOXES[number])
     state = next(s for s, pattern in enumerate(box.patterns) if pattern[2] == lid_tag)
     inference = begin_trial("learned-structure", memory, preset("learned"))
-    policy = GoalPolicy(Goal.of_slots(ASSUMPTIONS.alphabet, {"top": lid_tag}), settled=0.9)
+    policy = GoalPolicy(Goal.of_slots(ASSUMPTIONS.alphabet, {"top": lid_tag}), entropy_threshold=0.9)
     for action in [None, 1, 1, *([OPEN] if is_opened else [])]:
         if action is not None:
             inference.act(action)

@@ -38,28 +38,28 @@ def inference(memory):
 
 
 def test_one_action_ahead_is_expected_entropy(inference):
-    imagined = inference.imagined()
-    assert np.array_equal(imagined.expected_entropies(), inference.expected_entropies())
+    tree = inference.belief_tree()
+    assert np.array_equal(tree.expected_entropies(), inference.expected_entropies())
     for action in range(3):
-        looks = imagined.after(action)
+        looks = tree.after(action)
         assert looks.probabilities.sum() == pytest.approx(1.0, abs=1e-12)
         expected = looks.probabilities @ looks.entropies
-        assert expected == pytest.approx(imagined.expected_entropies()[action], abs=1e-6)
+        assert expected == pytest.approx(tree.expected_entropies()[action], abs=1e-6)
 
 
 def test_an_imagined_look_leaves_the_belief_that_the_real_one_does(memory):
     """But for what a real look teaches the plain ATGs, which here are all but ruled out."""
     inference = looked(memory, (3, 7))
-    look = int(inference.imagined().after(1).probabilities.argmax())
-    imagined = inference.imagined().after(1).belief(look)
+    look = int(inference.belief_tree().after(1).probabilities.argmax())
+    tree = inference.belief_tree().after(1).belief(look)
     inference.act(1)
     inference.observe(Evidence.of_detection(ARCUBES.alphabet, ARCUBES.alphabet.patterns[look]))
-    assert imagined.identity == pytest.approx(inference.identity().probabilities, abs=1e-3)
+    assert tree.identity == pytest.approx(inference.identity().probabilities, abs=1e-3)
 
 
 def test_imagining_changes_nothing(inference):
     before = inference.identity().probabilities
-    looks = inference.imagined().after(2)
+    looks = inference.belief_tree().after(2)
     looks.expected_entropies(np.argsort(looks.probabilities)[-3:])
     assert np.array_equal(inference.identity().probabilities, before)
 

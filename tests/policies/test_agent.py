@@ -15,7 +15,7 @@ from atg_fg.engines import begin_trial
 from atg_fg.experiments.table1 import TestPlan, run_test
 from atg_fg.experiments.trial import run_trial
 from atg_fg.policies import AgentPolicy, EntropyPolicy, SampledPolicy, as_policy, make_policy
-from atg_fg.policies.belief_features import BeliefSummary
+from atg_fg.policies.belief_features import BeliefFeatures
 from atg_fg.worlds.registry import make_world
 from tests.small import graph, one_slot, trial
 
@@ -54,7 +54,7 @@ def test_an_agent_sees_the_summary_and_its_action_is_taken():
     agent = Greedy(n_actions=2)
     choice = AgentPolicy(agent).choose(inference, np.random.default_rng(0))
     assert choice.action == EntropyPolicy().choose(inference, np.random.default_rng(0)).action == 1
-    np.testing.assert_array_equal(agent.seen[0], BeliefSummary(inference.memory.assumptions).of(inference))
+    np.testing.assert_array_equal(agent.seen[0], BeliefFeatures(inference.memory.assumptions).of(inference))
 
 
 @pytest.mark.parametrize("action", [1, np.int64(1), np.array(1), np.array([1])])
@@ -140,7 +140,7 @@ def own_module(tmp_path, monkeypatch):
 @pytest.mark.usefixtures("own_module")
 def test_a_policy_of_ones_own_goes_by_module_and_name():
     assert isinstance(make_policy("own_policies:Agents.actions"), SampledPolicy)
-    assert make_policy("own_policies:Agents.actions", settled=0.1).name == "stopping"
+    assert make_policy("own_policies:Agents.actions", entropy_threshold=0.1).name == "stopping"
     named = TestPlan(engine="bayes-filter", n_actions=3, n_trials=6, policy="own_policies:Agents.actions")
     assert run_test(named, 0) == run_test(PLAN, 0, policy=SampledPolicy(spaces.Discrete(3)))
 

@@ -120,7 +120,7 @@ def hidden_orientation():
 def test_a_goal_without_a_known_path_is_declared_or_explored_for(unreachable, endings):
     """Settled at once, since the prior leaves no doubt: this is about the way alone."""
     wanted = Goal(ASSUMPTIONS.alphabet, shown_pattern(CUBES[0], hidden_orientation()))
-    policy = GoalPolicy(wanted, unreachable=unreachable, settled=5.0)
+    policy = GoalPolicy(wanted, unreachable=unreachable, entropy_threshold=5.0)
     record = served(policy, one_way_memory(), start={"object": 0, "orientation": 0}, n_actions=200)
     assert record.steps[-1].purpose in endings
     assert ("explore" in purposes(record)) == (unreachable == "explore")
@@ -164,7 +164,7 @@ def test_bad_options_are_refused():
         GoalPolicy(goal_of(0, 0), "fastest")
     with pytest.raises(UnknownNameError, match="'give up'"):
         GoalPolicy(goal_of(0, 0), unreachable="give up")
-    with pytest.raises(InvalidInputError, match="settled: 0; expected"):
-        GoalPolicy(goal_of(0, 0), settled=0)
+    with pytest.raises(InvalidInputError, match="entropy_threshold: 0; expected"):
+        GoalPolicy(goal_of(0, 0), entropy_threshold=0)
     with pytest.raises(InvalidInputError, match=r"confidence: 1\.0; expected"):
         GoalPolicy(goal_of(0, 0), confidence=1.0)

@@ -88,22 +88,22 @@ def test_one_action_ahead_is_expected_entropy():
         for engine in ("gtsam", "enumeration"):
             other = gone_through(engine, case)
             np.testing.assert_allclose(
-                other.imagined().expected_entropies(), other.expected_entropies(), rtol=0, atol=1e-12
+                other.belief_tree().expected_entropies(), other.expected_entropies(), rtol=0, atol=1e-12
             )
 
 
 def test_each_action_s_looks_mean_what_expected_entropy_says():
     for _, inference in random_trials():
-        imagined = inference.imagined()
+        tree = inference.belief_tree()
         for action, expected in enumerate(inference.expected_entropies()):
-            looks = imagined.after(action)
+            looks = tree.after(action)
             assert looks.probabilities.sum() == pytest.approx(1, abs=1e-12)
             assert looks.probabilities @ looks.entropies == pytest.approx(expected, abs=1e-12)
 
 
 def test_looks_taken_together_are_those_taken_one_by_one():
     for _, inference in random_trials():
-        looks = inference.imagined().after(0)
+        looks = inference.belief_tree().after(0)
         possible = np.flatnonzero(looks.probabilities > 0)
         together = looks.expected_entropies(possible)
         one_by_one = [looks.belief(int(look)).expected_entropies() for look in possible]
@@ -136,14 +136,14 @@ def test_three_actions_ahead_is_the_enumeration_too():
 
 def exact_value(inference, horizon):
     """V_horizon, without stopping once the decision is clear."""
-    return bounds_ahead(inference.imagined(), horizon, [0.0]).high.min()
+    return bounds_ahead(inference.belief_tree(), horizon, [0.0]).high.min()
 
 
 def two_ahead(inference):
     """V_2 by first action, where every look is followed."""
     values = []
     for action in range(inference.model.n_actions):
-        looks = inference.imagined().after(action)
+        looks = inference.belief_tree().after(action)
         possible = np.flatnonzero(looks.probabilities > 0)
         values.append(looks.probabilities[possible] @ looks.expected_entropies(possible).min(axis=1))
     return values
@@ -225,8 +225,8 @@ def test_asking_changes_nothing_in_the_trial():
 
 def test_it_does_not_imagine_before_a_look():
     inference = begin_trial("bayes-filter", detour(), ModelParameters())
-    with pytest.raises(InvalidInputError, match="imagined: asked before the look"):
-        inference.imagined()
+    with pytest.raises(InvalidInputError, match="belief tree: asked before the look"):
+        inference.belief_tree()
 
 
 @pytest.mark.parametrize("horizon", [0, -1])

@@ -59,5 +59,7 @@ def test_a_smaller_entropy_takes_at_least_as_many_actions(memory):
 
 @pytest.mark.parametrize("settled", [0.0, -1.0, float("nan"), float("inf")])
 def test_an_entropy_that_means_nothing_is_refused(settled):
-    with pytest.raises(InvalidInputError, match=f"settled: {settled}; expected a finite entropy above 0 nats"):
+    with pytest.raises(
+        InvalidInputError, match=f"entropy_threshold: {settled}; expected a finite entropy above 0 nats"
+    ):
         StoppingPolicy(EntropyPolicy(), settled)

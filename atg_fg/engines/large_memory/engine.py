@@ -40,7 +40,7 @@ class LargeMemory(Inference):
     open which action is the best one, expected entropy is computed of all objects. ``docs/large_memories.md`` has the
     derivation.
 
-    Tables over all objects and patterns are not made. What needs them (situations, imagined beliefs, the whole chain)
+    Tables over all objects and patterns are not made. What needs them (components of the belief, the belief tree, the whole chain)
     raises ``TooLargeError`` where they would be too large.
 
     Args:

@@ -216,7 +216,7 @@ def test_tables_that_would_be_too_large_are_refused_and_the_rest_goes_on(monkeyp
     case = many_objects(2)
     inference = begun(case, n_exact=0)
     inference.observe(case.looks[0].evidence(case.assumptions.alphabet))
-    for asked in (inference.situations, inference.imagined, inference.shown_patterns):
+    for asked in (inference.belief_components, inference.belief_tree, inference.shown_patterns):
         with pytest.raises(TooLargeError, match="12 objects and 20 patterns"):
             asked()
     assert inference.expected_entropies().shape == (2,)
