@@ -26,9 +26,11 @@ def bench(
     quick: Annotated[bool, typer.Option("--quick", help="Only see that everything runs: less than a minute.")] = False,
     sizes: Annotated[str | None, typer.Option(help="Numbers of remembered objects, such as 10,100,1000.")] = None,
     rounds: Annotated[
-        int | None, typer.Option(help="Rounds of all contestants; at most 3 from 10,000 objects on.")
+        int | None, typer.Option(min=1, help="Rounds of all contestants; at most 3 from 10,000 objects on.")
     ] = None,
-    tests: Annotated[int | None, typer.Option(help="Tests of Table 1 to time; fewer than 5 are scaled up.")] = None,
+    tests: Annotated[
+        int | None, typer.Option(min=1, help="Tests of Table 1 to time; fewer than 5 are scaled up.")
+    ] = None,
     given: Annotated[
         Path | None, typer.Option("--from", help="Measure nothing: show what an earlier run wrote with --json.")
     ] = None,
@@ -41,7 +43,6 @@ def bench(
 
     Example: atg-fg bench --sizes 10,100 --json bench.json
     """
-    options.check_at_least(1, rounds=rounds, tests=tests)
     options.check_json_option(json_file)
     page = None if markdown is None else _page(markdown)
     document = _measured(_plan(quick, sizes, rounds, tests)) if given is None else _read(given)

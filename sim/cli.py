@@ -22,15 +22,17 @@ app = typer.Typer(
 )
 
 Condition = Annotated[str, typer.Option(help="What the robot works under: nominal or worn.")]
-Actions = Annotated[int, typer.Option(help="Number of random actions.")]
+Actions = Annotated[int, typer.Option(min=1, help="Number of random actions.")]
 
 
 @app.command()
 def reliability(
     condition: Condition = "nominal",
     actions: Actions = 1000,
-    stations: Annotated[int, typer.Option(help="Cubes in the scene; the robot goes to a random one each time.")] = 1,
-    seed: Annotated[int, typer.Option(help="Seed of cubes, actions and circumstances.")] = 0,
+    stations: Annotated[
+        int, typer.Option(min=1, help="Cubes in the scene; the robot goes to a random one each time.")
+    ] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of cubes, actions and circumstances.")] = 0,
     urdf: options.Urdf = None,
     jobs: options.Jobs = None,
     json_file: options.JsonFile = None,
@@ -83,14 +85,13 @@ def picture(
     output: Annotated[Path, typer.Option(help="PNG file to write.")] = Path("robot.png"),
     film: Annotated[Path | None, typer.Option(help="Write the robot's three actions as an animated GIF.")] = None,
     table: Annotated[Path | None, typer.Option(help="Write a picture of the robot before three cubes, PNG.")] = None,
-    seed: Annotated[int, typer.Option(help="Seed of the cubes.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the cubes.")] = 0,
     urdf: options.Urdf = None,
 ) -> None:
     """Draw the robot as it turns a cube over: a strip of one flip, and what its head sees.
 
     Example: atg-fg sim picture --output robot.png --film actions.gif --table table.png
     """
-    options.check_at_least(0, seed=seed)
     from sim.pictures import draw_actions, draw_flip, draw_table
 
     for file in (output, table):
@@ -110,8 +111,6 @@ def _run(
     """Check the options and run the actions, with a progress bar."""
     from sim.reliability import ACTIONS_A_TRIAL, run_actions
 
-    options.check_at_least(1, actions=actions, stations=stations, jobs=jobs)
-    options.check_at_least(0, seed=seed)
     options.check_json_option(json_file)
     with options.progress_bar("trials", -(-actions // ACTIONS_A_TRIAL)) as advance:
         return run_actions(condition, actions, seed, jobs or options.available_cpus(), urdf, advance, stations)

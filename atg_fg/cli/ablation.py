@@ -39,8 +39,6 @@ def ablation(
 
     Example: atg-fg ablation --actions 4,10 --noises ideal --tests 2 --log ablation.jsonl
     """
-    options.check_at_least(1, tests=tests, trials=trials, jobs=jobs)
-    options.check_at_least(0, seed=seed)
     workers = options.check_executor_option(executor, jobs)
     options.check_json_option(json_file)
     if plot is not None:

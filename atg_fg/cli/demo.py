@@ -58,8 +58,6 @@ def demo(
     Example: atg-fg demo --seed 1 --novel
     """
     check_arcube_world("--world", world)
-    options.check_at_least(1, actions=actions)
-    options.check_at_least(0, seed=seed)
     options.check_json_option(json_file)
     parameters = preset_named(preset)
     engine = options.engine_of(engine, parameters, "gtsam")

@@ -33,7 +33,6 @@ def compare(
 
     Example: atg-fg compare --trials 10 --engines bayes-filter,gtsam,mean-field
     """
-    options.check_at_least(0, seed=seed)
     options.check_json_option(json_file)
     names = list(ENGINES) if engines == "all" else engines.split(",")
     for name in names:
@@ -80,7 +79,7 @@ def _comparison_table(title: str, summary: dict[str, Any]) -> Table:
 
 def calibrate(
     engine: options.Engine = "bayes-filter",
-    trials: options.Trials = 5000,
+    trials: Annotated[int, typer.Option(min=2, help="Number of trials.")] = 5000,
     seed: options.Seed = 0,
     json_file: options.JsonFile = None,
 ) -> None:
@@ -88,8 +87,6 @@ def calibrate(
 
     Example: atg-fg calibrate --engine bayes-filter --trials 500
     """
-    options.check_at_least(2, trials=trials)
-    options.check_at_least(0, seed=seed)
     options.check_json_option(json_file)
     if engine not in ENGINES:
         raise unknown_name("engine", engine, ENGINES)

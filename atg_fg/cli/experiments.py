@@ -67,8 +67,6 @@ def table1(
 
     Example: atg-fg table1 --preset paper --engine bayes-filter
     """
-    options.check_at_least(1, tests=tests, actions=actions, trials=trials, jobs=jobs)
-    options.check_at_least(0, seed=seed)
     workers = options.check_executor_option(executor, jobs)
     options.check_entropy_option(settled)
     options.check_json_option(json_file)
@@ -185,8 +183,6 @@ def figure3(
     Example: atg-fg figure3 --actions 4:20 --tests 10 --plot figure3.png --csv figure3.csv
     """
     numbers = parse_actions(actions)
-    options.check_at_least(1, tests=tests, trials=trials, jobs=jobs)
-    options.check_at_least(0, seed=seed)
     workers = options.check_executor_option(executor, jobs)
     options.check_json_option(json_file)
     # Before the long run, so that its result is not lost.

@@ -19,19 +19,17 @@ from atg_fg.storage.scripted_trial import read_script
 
 def explain(
     file: Annotated[Path, typer.Argument(help="A scripted trial (JSON).", show_default=False)],
-    k: Annotated[int, typer.Option("--k", help="How many explanations, the most probable first.")] = 5,
-    samples: Annotated[int, typer.Option(help="How many explanations to draw from the posterior.")] = 0,
+    k: Annotated[int, typer.Option("--k", min=1, help="How many explanations, the most probable first.")] = 5,
+    samples: Annotated[int, typer.Option(min=0, help="How many explanations to draw from the posterior.")] = 0,
     smooth: Annotated[bool, typer.Option("--smooth", help="Add p(X_t | all evidence) of every look.")] = False,
     engine: options.Engine = "gtsam",
-    seed: Annotated[int, typer.Option(help="Seed of the samples.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the samples.")] = 0,
     json_file: options.JsonFile = None,
 ) -> None:
     """Print the most probable explanations of a trial (object and aspects), and how surprising each look was.
 
     Example: atg-fg explain tests/data/scripted_trial.json --k 3 --smooth
     """
-    options.check_at_least(1, k=k)
-    options.check_at_least(0, samples=samples, seed=seed)
     options.check_json_option(json_file)
     inference = run_script(read_script(plain_files.read_text_file(file), str(file)), engine)
     chain = inference.chain()

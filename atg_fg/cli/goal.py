@@ -41,9 +41,9 @@ def goal(
     settled: Annotated[
         float, typer.Option(help="Entropy of identity below which a cube is recognised, nats.")
     ] = ENTROPY_THRESHOLD,
-    trials: Annotated[int, typer.Option(help="Runs, each with a memory, cubes and goals of its own.")] = 20,
+    trials: Annotated[int, typer.Option(min=1, help="Runs, each with a memory, cubes and goals of its own.")] = 20,
     actions: Annotated[int, typer.Option(help="Actions on each cube, at most.")] = 40,
-    seed: Annotated[int, typer.Option(help="Seed of all runs.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of all runs.")] = 0,
     slip: options.Slip = 0.0,
     wrong: options.Wrong = 0.0,
     missing: options.Missing = 0.0,
@@ -62,8 +62,6 @@ def goal(
 
     Example: atg-fg goal --cubes 3 --memory-cubes 20 --trials 50 --engine bayes-filter
     """
-    options.check_at_least(1, trials=trials, jobs=jobs)
-    options.check_at_least(0, seed=seed)
     workers = options.check_executor_option(executor, jobs)
     options.check_json_option(json_file)
     if resume and records is None:

@@ -45,13 +45,15 @@ Settled = Annotated[
     float | None,
     typer.Option(help="End a trial when the entropy of the verdict is at most this, nats; --actions is then the most."),
 ]
-Seed = Annotated[int, typer.Option(help="Seed; test number k uses seed + k.")]
-Actions = Annotated[int, typer.Option(help="Actions a trial.")]
-Tests = Annotated[int, typer.Option(help="Number of tests.")]
-Trials = Annotated[int, typer.Option(help="Trials a test.")]
+Seed = Annotated[int, typer.Option(min=0, help="Seed; test number k uses seed + k.")]
+Actions = Annotated[int, typer.Option(min=1, help="Actions a trial.")]
+Tests = Annotated[int, typer.Option(min=1, help="Number of tests.")]
+Trials = Annotated[int, typer.Option(min=1, help="Trials a test.")]
 Jobs = Annotated[
     int | None,
-    typer.Option(help="Processes or threads; the result is the same for any number. All processors if not given."),
+    typer.Option(
+        min=1, help="Processes or threads; the result is the same for any number. All processors if not given."
+    ),
 ]
 Executor = Annotated[
     str, typer.Option(help=f"Where tests or runs are done: {EXECUTORS}; the result is the same anywhere.")
@@ -109,14 +111,6 @@ def _own_option(text: str) -> tuple[str, Any]:
 def engine_of(engine: str | None, parameters: ModelParameters, usual: str) -> str:
     """Return the engine that was asked for, or else the usual one, or the one that the parameters need."""
     return usual_engine(parameters, usual) if engine is None else engine
-
-
-def check_at_least(least: int, **numbers: int | None) -> None:
-    """Refuse an option, named by its keyword, whose number is below ``least``."""
-    for name, value in numbers.items():
-        if value is not None and value < least:
-            option = f"--{name.replace('_', '-')}"
-            raise InvalidInputError(f"{option}: {value}; expected a whole number of at least {least}")
 
 
 def check_executor_option(executor: str, jobs: int | None) -> int:

@@ -24,7 +24,7 @@ Paper = Annotated[str, typer.Option(help="Paper: a4, a3 or letter.")]
 @app.command()
 def cube(
     tags: Annotated[str, typer.Option(help="Ids of the tags that may be on the cubes, such as 0-11.")] = "0-11",
-    cubes: Annotated[int, typer.Option(help="Number of cubes, told apart in as few actions as can be.")] = 1,
+    cubes: Annotated[int, typer.Option(min=1, help="Number of cubes, told apart in as few actions as can be.")] = 1,
     dictionary: Annotated[str, typer.Option(help="Dictionary of the tags.")] = "5X5_50",
     side: Annotated[float, typer.Option(help="Side of a cube, mm.")] = 56.0,
     tag_size: Annotated[float | None, typer.Option(help="Side of a tag, mm; three quarters of the cube's.")] = None,
@@ -32,7 +32,7 @@ def cube(
     output: Annotated[
         Path, typer.Option("--output", "-o", help="PDF to cut and glue, or .3mf or .stl for a 3D printer.")
     ] = Path("cube.pdf"),
-    seed: Annotated[int, typer.Option(help="Seed of the draws among which the cubes are chosen.")] = 0,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of the draws among which the cubes are chosen.")] = 0,
     json_file: options.JsonFile = None,
 ) -> None:
     """Make cubes of your own, and the file that tells look and live which tags are on them.
@@ -42,8 +42,6 @@ def cube(
     Example: atg-fg print cube --tags 0-11 --cubes 3 -o cubes.pdf
     """
     options.check_json_option(json_file)
-    options.check_at_least(1, cubes=cubes)
-    options.check_at_least(0, seed=seed)
     for name, length in (("--side", side), ("--tag-size", tag_size)):
         if length is not None and not 1 <= length <= 2000:
             raise InvalidInputError(f"{name}: {length}; expected 1 to 2000 mm")

@@ -55,7 +55,7 @@ def trial(
         bool, typer.Option("--frames", help="Save what the camera sees at each look in a folder beside the record.")
     ] = False,
     seed: options.Seed = 0,
-    cubes_seed: Annotated[int, typer.Option(help="Seed of the world's 100 objects, cubes or others.")] = 0,
+    cubes_seed: Annotated[int, typer.Option(min=0, help="Seed of the world's 100 objects, cubes or others.")] = 0,
     slip: options.Slip = 0.0,
     wrong: options.Wrong = 0.0,
     missing: options.Missing = 0.0,
@@ -69,8 +69,6 @@ def trial(
 
     Example: atg-fg trial --memory robot.db --save-memory robot.db --seed 3
     """
-    options.check_at_least(1, actions=actions)
-    options.check_at_least(0, seed=seed, cubes_seed=cubes_seed)
     options.check_entropy_option(settled)
     options.check_json_option(json_file)
     for path in (save_memory, record):

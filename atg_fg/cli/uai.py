@@ -36,7 +36,7 @@ def solve(
     ],
     evidence: Annotated[Path | None, typer.Option(help="Evidence in the UAI format.")] = None,
     limit: Annotated[
-        int, typer.Option(help="Refuse if tables would have more entries; 8 bytes each.")
+        int, typer.Option(min=1, help="Refuse if tables would have more entries; 8 bytes each.")
     ] = queries.DEFAULT_LIMIT,
     json_file: options.JsonFile = None,
 ) -> None:
@@ -46,7 +46,6 @@ def solve(
     """
     if task not in TASKS:
         raise InvalidInputError(f"--task: {task!r}; expected one of: {', '.join(TASKS)}")
-    options.check_at_least(1, limit=limit)
     options.check_json_option(json_file)
     read = read_model(plain_files.read_text_file(model), str(model))
     observed: dict[int, int] = {}

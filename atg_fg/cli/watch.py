@@ -43,8 +43,6 @@ def watch(
     Example: atg-fg watch --world robonaut --save trial.rrd
     """
     check_arcube_world("--world", world)
-    options.check_at_least(1, actions=actions)
-    options.check_at_least(0, seed=seed)
     import_rerun()  # fails now rather than after the memory is learned, if it is not installed
     if save is not None:
         check_path(save)

@@ -1,7 +1,7 @@
 """What a planner needs of a belief: which objects there may be before the robot, and where it may be in what it knows.
 
-An engine with another model than plain ATGs overrides ``Inference.belief_components`` and ``Inference.shown_patterns``; the
-planners need not know.
+An engine with another model than plain ATGs overrides ``Inference.belief_components`` and
+``Inference.shown_patterns``; the planners need not know.
 """
 
 from __future__ import annotations

@@ -49,7 +49,7 @@ def make_policy(name: str, entropy_threshold: float | None = None) -> Policy:
     Args:
         name: In ``POLICIES``, or ``module:object`` of a user's own: a policy, an agent with ``predict``, or a space of
             actions.
-        entropy_threshold: Entropy of the verdict in nats at which the policy ends the trial; it never does if not given.
+        entropy_threshold: Entropy of the verdict, nats, at which the policy ends the trial; it never does if not given.
 
     Raises:
         UnknownNameError: There is no such policy.

@@ -51,7 +51,7 @@ def test_a_board_is_printed(run, tmp_path):
         (["--tags", "0-99999999"], "of at most 10000"),
         (["--tags", "1,1,2,3,4,5"], "expected all different"),
         (["--dictionary", "nope"], "dictionary of tags: unknown name 'nope'"),
-        (["--cubes", "0"], "--cubes: 0; expected a whole number of at least 1"),
+        (["--cubes", "0"], "'--cubes': Input should be greater than or equal to"),
         (["--cubes", "31", "--tags", "0-5"], "expected at most 30"),
         (["--side", "400"], "cube of 400 mm; expected at most 194 mm on a4"),
         (["--side", "nan"], "--side: nan; expected 1 to 2000 mm"),

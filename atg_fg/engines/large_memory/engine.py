@@ -40,8 +40,8 @@ class LargeMemory(Inference):
     open which action is the best one, expected entropy is computed of all objects. ``docs/large_memories.md`` has the
     derivation.
 
-    Tables over all objects and patterns are not made. What needs them (components of the belief, the belief tree, the whole chain)
-    raises ``TooLargeError`` where they would be too large.
+    Tables over all objects and patterns are not made. What needs them (components of the belief, the belief tree, the
+    whole chain) raises ``TooLargeError`` where they would be too large.
 
     Args:
         memory: The robot memory when the trial begins; it must not change while the trial goes on. Any but a
