@@ -61,7 +61,9 @@ def test_explain_draws_the_same_samples_from_the_same_seed(run):
 def test_bad_options_are_refused(refused):
     assert "unknown name 'magic'" in refused("compare", "--engines", "magic")
     assert "unknown name 'magic'" in refused("calibrate", "--engine", "magic")
-    assert "--trials: 1" in refused("calibrate", "--trials", 1)
-    assert "n_trials: 0" in refused("compare", "--trials", 0)
-    assert "--k: 0" in refused("explain", "tests/data/scripted_trial.json", "--k", 0)
+    assert "'--trials': Input should be greater than or equal to 2" in refused("calibrate", "--trials", 1)
+    assert "'--trials': Input should be greater than or equal to 1" in refused("compare", "--trials", 0)
+    assert "'--k': Input should be greater than or equal to 1" in refused(
+        "explain", "tests/data/scripted_trial.json", "--k", 0
+    )
     assert "nowhere.json" in refused("explain", "nowhere.json")

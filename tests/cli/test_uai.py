@@ -56,7 +56,9 @@ def test_results_leave_as_json_too(run, model, tmp_path):
 
 def test_what_cannot_be_solved_is_one_line(refused, model, tmp_path):
     assert "--task: 'SUM'; expected one of: MAR, PR, MPE" in refused("uai", "solve", model, "--task", "SUM")
-    assert "--limit: 0" in refused("uai", "solve", model, "--task", "PR", "--limit", 0)
+    assert "'--limit': Input should be greater than or equal to 1" in refused(
+        "uai", "solve", model, "--task", "PR", "--limit", 0
+    )
     assert "4 entries (32 bytes); the limit is 3" in refused("uai", "solve", model, "--task", "PR", "--limit", 3)
     assert "cannot be read" in refused("uai", "solve", tmp_path / "absent.uai", "--task", "PR")
     evidence = tmp_path / "seen.evid"
