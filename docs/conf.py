@@ -9,7 +9,7 @@ from typing import Any
 
 import atg_fg
 
-sys.path.insert(0, str(Path(__file__).parent))  # for code_links
+sys.path.insert(0, str(Path(__file__).parent))  # for the extensions that lie here
 
 project = "atg-fg"
 author = "The atg-fg developers"
@@ -22,7 +22,11 @@ extensions = [
     "sphinx.ext.autosummary",
     "sphinx.ext.napoleon",
     "sphinx.ext.viewcode",
+    "sphinx.ext.mathjax",
+    "sphinx-mathjax-offline",  # equations show without network
+    "sphinx_design",
     "code_links",
+    "public_names",
 ]
 html_theme = "furo"
 html_title = "atg-fg"
@@ -35,8 +39,6 @@ templates_path = ["_templates"]
 nb_execution_mode = "off"
 myst_enable_extensions = ["dollarmath", "colon_fence"]
 myst_heading_anchors = 3
-# Pages that take in a section of the README begin at its level.
-suppress_warnings = ["myst.header"]
 
 autosummary_generate = True
 autodoc_member_order = "bysource"
@@ -49,6 +51,13 @@ napoleon_use_ivar = True  # autodoc describes attributes itself
 def _plain_docstring(app: Any, what: str, name: str, target: Any, options: Any, lines: list[str]) -> None:
     """Keep Sphinx from taking |𝒵| for a substitution, and a name that ends in an underscore for a link."""
     lines[:] = [re.sub(r"(?<!`)(\||\w_(?=\W|$))(?!`)", _escaped, line) for line in lines]
+
+
+def _whole_attribute(app: Any, what: str, name: str, target: Any, options: Any, lines: list[str]) -> None:
+    """Join what napoleon takes apart: to it, what stands before a colon in an attribute's docstring is a type."""
+    if what in ("attribute", "data", "property") and lines and lines[-1].startswith(":type: "):
+        beginning = lines.pop().removeprefix(":type: ")
+        lines[0] = f"{beginning}: {lines[0]}"
 
 
 def _escaped(found: re.Match[str]) -> str:
@@ -66,4 +75,5 @@ def _only_this_branch(app: Any, page: str, template: str, context: dict[str, Any
 def setup(app: Any) -> None:
     """Add what is of this site alone."""
     app.connect("autodoc-process-docstring", _plain_docstring, priority=100)
+    app.connect("autodoc-process-docstring", _whole_attribute, priority=900)
     app.connect("html-page-context", _only_this_branch, priority=100)
