@@ -6,7 +6,7 @@ READY := $(VENV)/.ready
 
 .DEFAULT_GOAL := help
 .PHONY: help setup demo test test-all torture lint format notebooks docs bench results results-engines results-robot results-goal \
-	results-structure clean
+	results-structure example-memory tour clean
 
 help:  ## Say what there is to make
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -134,6 +134,17 @@ results-structure: $(READY)  ## Run the experiments on learned structure (about 
 	$(BIN)/atg-fg rescore results/robonaut/*/test-0000.jsonl.gz --preset learned --json results/rescore_learned.json
 	$(BIN)/atg-fg ablation --variants "paper;default;learned" --tests 10 --log results/ablation.jsonl \
 		--json results/ablation.json --plot docs/images/ablation.png
+
+# The memory that `atg-fg memory example` writes: 30 trials, one after the other, of the 100 cubes of seed 0.
+EXAMPLE := out/example.json
+example-memory: $(READY)  ## Learn the memory that comes with the package (half a minute)
+	mkdir -p out
+	rm -f $(EXAMPLE)
+	for seed in $$(seq 100 129); do \
+		$(BIN)/atg-fg trial --preset learned $$(test -e $(EXAMPLE) && echo --memory $(EXAMPLE)) --save-memory $(EXAMPLE) \
+			--seed $$seed || exit; \
+	done
+	cp $(EXAMPLE) atg_fg/storage/data/cubes.json
 
 clean:  ## Remove what make has made
 	rm -rf $(VENV) out build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 import sys
+from pathlib import Path
 from typing import Any
 
 from docutils import nodes
@@ -32,12 +34,12 @@ class PublicNames(SphinxDirective):
 
 def _place(name: str) -> str:
     """Return the full name of a public object, in the module that defines it."""
-    value = getattr(atg_fg, name)
-    module = getattr(value, "__module__", None)
+    module = getattr(getattr(atg_fg, name), "__module__", None)
     if not isinstance(module, str) or not module.startswith("atg_fg."):
-        # A table by name, such as ENGINES: the module nearest to the root that has it.
-        owners = [each for each, loaded in sys.modules.items() if each.startswith("atg_fg.") and hasattr(loaded, name)]
-        module = min((each for each in owners if getattr(sys.modules[each], name) is value), key=len)
+        # A table by name, such as ENGINES, does not know where it is from.
+        defined = re.compile(rf"^{name}\b.*=", re.MULTILINE)
+        loaded = [each for each in sys.modules.values() if each.__name__.startswith("atg_fg.")]
+        (module,) = (each.__name__ for each in loaded if defined.search(Path(str(each.__file__)).read_text()))
     return f"{module}.{name}"
 
 

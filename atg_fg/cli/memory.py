@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import typer
 from rich.table import Table
@@ -20,8 +20,9 @@ from atg_fg.storage.database.checking import faults_of_database
 from atg_fg.storage.database.connection import is_database
 from atg_fg.storage.database.memory_reading import database_holds_memory
 from atg_fg.storage.database.trial_log import read_stored_experiments, read_stored_trials
+from atg_fg.storage.example import example_memory
 from atg_fg.storage.memory_files import load_memory
-from atg_fg.storage.memory_json import MEMORY_FORMAT, memory_from_document
+from atg_fg.storage.memory_json import MEMORY_FORMAT, memory_from_document, memory_from_json
 
 app = typer.Typer(
     help="Look at a saved robot memory, check it, export and merge its graphs. Example: atg-fg memory show memory.json",
@@ -87,6 +88,20 @@ def _records(file: Path) -> dict[str, Any]:
     counts = Counter(trial.experiment for trial in read_stored_trials(file))
     experiments = [{**asdict(each), "trials": counts[each.number]} for each in read_stored_experiments(file)]
     return {"experiments": experiments, "trials": counts.total()}
+
+
+@app.command()
+def example(
+    output: Annotated[Path, typer.Argument(help="File to write (JSON).", show_default=False)],
+) -> None:
+    """Write the memory that comes with atg-fg: cubes, learned in 30 trials of 10 actions with the preset learned.
+
+    Example: atg-fg memory example cubes.json
+    """
+    text = example_memory()
+    memory = memory_from_json(text, "cubes.json")
+    plain_files.write_bytes_atomically(output, text.encode())
+    typer.echo(f"{output}: {len(memory)} of {memory.assumptions.n_objects} objects")
 
 
 @app.command()

@@ -36,6 +36,7 @@ class Engines(Mapping[str, type[Inference]]):
         return len(self._places)
 
 
+#: Classes of engines by the names that ``begin_trial`` and ``--engine`` take.
 ENGINES: Final = Engines(
     {
         "gtsam": "gtsam_elimination:GtsamElimination",

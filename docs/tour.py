@@ -1,0 +1,106 @@
+"""The tour of commands in ``docs/tour.md``: ``python docs/tour.py`` runs them and writes down what they print.
+
+A command is a line of a console block that begins with ``$``; what follows are the first lines of its output. Where the
+block says ``...`` after them, as many lines are kept as there were, or eight. The time, in seconds, is written
+behind the block that the command stands in.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+import tempfile
+import time
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Final
+
+ROOT: Final = Path(__file__).parents[1]
+PAGE: Final = ROOT / "docs" / "tour.md"
+CUT: Final = "..."
+_BLOCK: Final = re.compile(r"```console\n(?P<text>.*?)```\n(?P<times>\n\*Takes [^*]+\*\n)?", re.DOTALL)
+#: A terminal of always the same kind.
+_ENVIRONMENT: Final = {"COLUMNS": "110", "NO_COLOR": "1", "TERM": "dumb"}
+
+
+@dataclass
+class Command:
+    """A command of the tour, and the first lines of its output; ``cut`` if more lines follow."""
+
+    line: str
+    output: list[str]
+    cut: bool
+
+    def __str__(self) -> str:
+        return "\n".join([f"$ {self.line}", *self.output, *([CUT] if self.cut else [])])
+
+
+def commands_in(block: str) -> list[Command]:
+    """Return the commands in the text of a console block."""
+    found: list[Command] = []
+    for line in block.splitlines():
+        if line.startswith("$ "):
+            found.append(Command(line.removeprefix("$ "), [], cut=False))
+        elif line == CUT:
+            found[-1].cut = True
+        else:
+            found[-1].output.append(line)
+    return found
+
+
+def commands() -> list[Command]:
+    """Return all commands of the page, in their order."""
+    return [each for block in _BLOCK.finditer(PAGE.read_text()) for each in commands_in(block["text"])]
+
+
+def run(line: str, folder: Path, *more: str) -> subprocess.CompletedProcess[str]:
+    """Run a command in a folder, with more options behind it."""
+    program, *arguments = shlex.split(line)
+    return subprocess.run(
+        [Path(sys.executable).with_name(program), *arguments, *more],
+        cwd=folder,
+        env={**os.environ, **_ENVIRONMENT},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+
+
+def printed(output: str) -> list[str]:
+    """Return lines as the page has them: without spaces at their end."""
+    return [line.rstrip() for line in output.rstrip().splitlines()]
+
+
+def make_folder(folder: Path) -> None:
+    """Put what the commands read beside what they make."""
+    (folder / "tests").symlink_to(ROOT / "tests")
+
+
+def _written(block: re.Match[str], folder: Path) -> str:
+    """Run the commands of a block and return it with what they print."""
+    found, times = commands_in(block["text"]), []
+    for command in found:
+        begun = time.perf_counter()
+        done = run(command.line, folder)
+        times.append(max(1, round(time.perf_counter() - begun)))
+        if done.returncode:
+            sys.exit(f"{command.line}: {done.stderr}")
+        lines = printed(done.stdout)
+        command.output = lines[: len(command.output) or 8] if command.cut else lines
+        print(f"{times[-1]:4} s  {command.line}", flush=True)
+    text = "\n".join(map(str, found))
+    return f"```console\n{text}\n```\n\n*Takes {' + '.join(map(str, times))} s.*\n"
+
+
+def main() -> None:
+    """Run all commands and write the page anew."""
+    with tempfile.TemporaryDirectory() as name:
+        make_folder(Path(name))
+        PAGE.write_text(_BLOCK.sub(lambda block: _written(block, Path(name)), PAGE.read_text()))
+
+
+if __name__ == "__main__":
+    main()
