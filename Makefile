@@ -70,9 +70,9 @@ results: $(READY)  ## Run the experiments of README's results in the ideal world
 
 # README's table of methods, and how calibrated each engine is (about a quarter of an hour).
 results-engines: $(READY)  ## Compare and calibrate all inference engines
-	$(BIN)/atg-fg compare --trials 50 --engines all --json results/compare.json
+	$(BIN)/atg-fg engines compare --trials 50 --engines all --json results/compare.json
 	for engine in bayes-filter gtsam particle gibbs loopy-bp mean-field; do \
-		$(BIN)/atg-fg calibrate --engine $$engine --trials 5000 --json results/calibrate_$$engine.json || exit; \
+		$(BIN)/atg-fg engines check --engine $$engine --trials 5000 --json results/calibrate_$$engine.json || exit; \
 	done
 
 # Reliability first: the preset robot is estimated from it. A test that was cut off goes on where it stopped.
@@ -130,7 +130,7 @@ results-structure: $(READY)  ## Run the experiments on learned structure (about 
 			--json results/table1_$${world}_learned.json || exit; \
 	done
 	$(BIN)/atg-fg table1 --preset learned --tests 1 --trials 10 --save-memories out
-	$(BIN)/atg-fg structure show out/memory-0000.json --plot docs/images/structure.png
+	$(BIN)/atg-fg memory structure out/memory-0000.json --plot docs/images/structure.png
 	$(BIN)/atg-fg rescore results/robonaut/*/test-0000.jsonl.gz --preset learned --json results/rescore_learned.json
 	$(BIN)/atg-fg ablation --variants "paper;default;learned" --tests 10 --log results/ablation.jsonl \
 		--json results/ablation.json --plot docs/images/ablation.png

@@ -10,7 +10,7 @@ import typer
 import typer.exceptions
 
 from atg_fg.cli.lazy_commands import LazyCommand, LazyGroup
-from atg_fg.core.errors import AtgError
+from atg_fg.core.errors import AtgError, InvalidInputError
 from atg_fg.core.version import __version__
 
 #: The commands, and groups of them, by the panel of the help page that they stand in; each with its place.
@@ -33,7 +33,6 @@ COMMANDS: Final = {
     },
     "Memory": {
         "memory": "atg_fg.cli.memory:app",
-        "structure": "atg_fg.cli.structure:app",
     },
     "Experiments": {
         "table1": "atg_fg.cli.experiments:table1",
@@ -43,13 +42,16 @@ COMMANDS: Final = {
         "goal": "atg_fg.cli.goal:goal",
     },
     "Engines": {
-        "compare": "atg_fg.cli.engines:compare",
-        "calibrate": "atg_fg.cli.engines:calibrate",
+        "engines": "atg_fg.cli.engines:app",
     },
 }
 
 #: The panels of those that packages beside this one offer by entry points.
 OFFERED: Final = {"report": "Your data", "bench": "Engines", "sim": "Simulation"}
+
+
+#: Commands of earlier versions, and what they are called now.
+MOVED: Final = {"compare": "engines compare", "calibrate": "engines check", "structure": "memory structure"}
 
 
 class _Commands(LazyGroup):
@@ -62,6 +64,12 @@ class _Commands(LazyGroup):
                 self.add_command(LazyCommand(name, place, panel))
         for entry in entry_points(group="atg_fg.commands"):
             self.add_command(LazyCommand(entry.name, entry.value, OFFERED.get(entry.name, "More")))
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """Return the command of this name; say where one went that has another name now."""
+        if cmd_name in MOVED:
+            raise InvalidInputError(f"{cmd_name}: this command has another name now; expected atg-fg {MOVED[cmd_name]}")
+        return super().get_command(ctx, cmd_name)
 
 
 app = typer.Typer(

@@ -1,4 +1,4 @@
-"""``atg-fg compare`` and ``atg-fg calibrate``: the inference engines held against each other and against the model."""
+"""``atg-fg engines``: the inference engines held against each other and against the model."""
 
 from __future__ import annotations
 
@@ -15,7 +15,13 @@ from atg_fg.experiments import calibration
 from atg_fg.experiments import engine_comparison as comparison
 from atg_fg.storage.presets import preset as preset_named
 
+app = typer.Typer(
+    help="Compare inference engines, and check that one is calibrated. Example: atg-fg engines compare",
+    no_args_is_help=True,
+)
 
+
+@app.command()
 def compare(
     trials: options.Trials = 50,
     engines: Annotated[str, typer.Option(help=f"all, or a list such as gtsam,particle. {', '.join(ENGINES)}.")] = "all",
@@ -31,7 +37,7 @@ def compare(
 ) -> None:
     """Compare inference engines on the same trials: error against exact, decisions, and cost.
 
-    Example: atg-fg compare --trials 10 --engines bayes-filter,gtsam,mean-field
+    Example: atg-fg engines compare --trials 10 --engines bayes-filter,gtsam,mean-field
     """
     options.check_json_option(json_file)
     names = list(ENGINES) if engines == "all" else engines.split(",")
@@ -77,7 +83,8 @@ def _comparison_table(title: str, summary: dict[str, Any]) -> Table:
     return table
 
 
-def calibrate(
+@app.command()
+def check(
     engine: options.Engine = "bayes-filter",
     trials: Annotated[int, typer.Option(min=2, help="Number of trials.")] = 5000,
     seed: options.Seed = 0,
@@ -85,7 +92,7 @@ def calibrate(
 ) -> None:
     """Draw trials from the model itself, and test that an engine's posteriors are those of the model.
 
-    Example: atg-fg calibrate --engine bayes-filter --trials 500
+    Example: atg-fg engines check --engine bayes-filter --trials 500
     """
     options.check_json_option(json_file)
     if engine not in ENGINES:

@@ -19,6 +19,9 @@ from atg_fg.policies.goal import ENTROPY_THRESHOLD, PLANNERS
 from atg_fg.storage.presets import preset as preset_named
 from atg_fg.worlds.base import World
 
+#: Panels of the help page beside those in ``options``.
+_MEMORY: Final = "The memory, learned beforehand"
+_GOAL: Final = "Reaching the goal"
 #: How worlds with a camera are filmed: by an observer, or by what is detected at each look.
 RENDER_MODES: Final = {"rendered": "detections", "robonaut": "rgb_array_list"}
 
@@ -27,23 +30,45 @@ def goal(
     world: options.ARcubeWorld = "ideal",
     engine: options.PresetsEngine = None,
     preset: options.Preset = "default",
-    cubes: Annotated[int, typer.Option(help="Cubes before the robot, each at a station.")] = 3,
-    memory_cubes: Annotated[int, typer.Option(help="Cubes that the memory is learned from, these among them.")] = 20,
-    learning_actions: Annotated[
-        int, typer.Option(help=f"Actions on each cube while the memory is learned; {COMPLETE} makes it complete.")
+    cubes: Annotated[
+        int, typer.Option(help="Cubes before the robot, each at a station.", rich_help_panel=options.WORLD)
+    ] = 3,
+    memory_cubes: Annotated[
+        int, typer.Option(help="Cubes that the memory is learned from, these among them.", rich_help_panel=_MEMORY)
     ] = 20,
-    learning_policy: Annotated[str, typer.Option(help=f"Policy then: {', '.join(POLICIES)}.")] = "explore",
-    learning_world: Annotated[str, typer.Option(help="World in which the memory is learned.")] = "ideal",
-    planner: Annotated[str, typer.Option(help=f"How a way is found: {', '.join(PLANNERS)}.")] = "attempts",
+    learning_actions: Annotated[
+        int,
+        typer.Option(
+            help=f"Actions on each cube while the memory is learned; {COMPLETE} makes it complete.",
+            rich_help_panel=_MEMORY,
+        ),
+    ] = 20,
+    learning_policy: Annotated[
+        str, typer.Option(help=f"Policy then: {', '.join(POLICIES)}.", rich_help_panel=_MEMORY)
+    ] = "explore",
+    learning_world: Annotated[
+        str, typer.Option(help="World in which the memory is learned.", rich_help_panel=_MEMORY)
+    ] = "ideal",
+    planner: Annotated[
+        str, typer.Option(help=f"How a way is found: {', '.join(PLANNERS)}.", rich_help_panel=_GOAL)
+    ] = "attempts",
     unreachable: Annotated[
-        str, typer.Option(help="A goal that no known path leads to: declare (say so and stop) or explore.")
+        str,
+        typer.Option(
+            help="A goal that no known path leads to: declare (say so and stop) or explore.", rich_help_panel=_GOAL
+        ),
     ] = "declare",
     settled: Annotated[
-        float, typer.Option(help="Entropy of identity below which a cube is recognised, nats.")
+        float, typer.Option(help="Entropy of identity below which a cube is recognised, nats.", rich_help_panel=_GOAL)
     ] = ENTROPY_THRESHOLD,
-    trials: Annotated[int, typer.Option(min=1, help="Runs, each with a memory, cubes and goals of its own.")] = 20,
-    actions: Annotated[int, typer.Option(help="Actions on each cube, at most.")] = 40,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of all runs.")] = 0,
+    trials: Annotated[
+        int,
+        typer.Option(
+            min=1, help="Runs, each with a memory, cubes and goals of its own.", rich_help_panel=options.TRIALS
+        ),
+    ] = 20,
+    actions: Annotated[int, typer.Option(help="Actions on each cube, at most.", rich_help_panel=options.TRIALS)] = 40,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of all runs.", rich_help_panel=options.TRIALS)] = 0,
     slip: options.Slip = 0.0,
     wrong: options.Wrong = 0.0,
     missing: options.Missing = 0.0,
@@ -51,10 +76,16 @@ def goal(
     urdf: options.Urdf = None,
     jobs: options.Jobs = None,
     executor: options.Executor = "process",
-    records: Annotated[Path | None, typer.Option(help="Folder in which every run is saved as it ends.")] = None,
-    resume: Annotated[bool, typer.Option("--resume", help="Leave out the runs that --records holds.")] = False,
+    records: Annotated[
+        Path | None,
+        typer.Option(help="Folder in which every run is saved as it ends.", rich_help_panel=options.RUNNING),
+    ] = None,
+    resume: Annotated[
+        bool, typer.Option("--resume", help="Leave out the runs that --records holds.", rich_help_panel=options.RUNNING)
+    ] = False,
     video: Annotated[
-        Path | None, typer.Option(help="Film the first run into this .gif: a world with a camera.")
+        Path | None,
+        typer.Option(help="Film the first run into this .gif: a world with a camera.", rich_help_panel=options.RUNNING),
     ] = None,
     json_file: options.JsonFile = None,
 ) -> None:

@@ -10,7 +10,7 @@ from typing import Annotated, Any
 import typer
 from rich.table import Table
 
-from atg_fg.cli import memory_compact, memory_duplicates, memory_files, options
+from atg_fg.cli import memory_compact, memory_duplicates, memory_files, options, structure
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.storage import plain_files
@@ -35,6 +35,7 @@ app.command()(memory_files.diff)
 app.command()(memory_compact.compact)
 app.command()(memory_duplicates.duplicates)
 app.command()(memory_duplicates.unmerge)
+app.command()(structure.structure)
 
 
 @app.command()

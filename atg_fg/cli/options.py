@@ -30,52 +30,96 @@ def available_cpus() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
+#: Panels of the help page; what is in none of them stands in the first one, without a name.
+WORLD, MODEL, TRIALS, RUNNING = "World", "Model", "Trials", "Running"
+
 MemoryFile = Annotated[Path, typer.Argument(help="A memory: JSON, or a database.", show_default=False)]
-World = Annotated[str, typer.Option(help=f"World: {', '.join(WORLDS)}, or module:namespace/Id-v0 of your own.")]
+World = Annotated[
+    str, typer.Option(help=f"World: {', '.join(WORLDS)}, or module:namespace/Id-v0 of your own.", rich_help_panel=WORLD)
+]
 ARcubeWorld = Annotated[
-    str, typer.Option(help=f"World of ARcubes: {', '.join(ARCUBE_WORLDS)}, or module:namespace/Id-v0 of your own.")
+    str,
+    typer.Option(
+        help=f"World of ARcubes: {', '.join(ARCUBE_WORLDS)}, or module:namespace/Id-v0 of your own.",
+        rich_help_panel=WORLD,
+    ),
 ]
 Engine = Annotated[str, typer.Option(help=f"Inference engine: {', '.join(ENGINES)}.")]
 PresetsEngine = Annotated[
-    str | None, typer.Option(help=f"Inference engine: {', '.join(ENGINES)}. The preset's usual one if not given.")
+    str | None,
+    typer.Option(
+        help=f"Inference engine: {', '.join(ENGINES)}. The preset's usual one if not given.", rich_help_panel=MODEL
+    ),
 ]
-Preset = Annotated[str, typer.Option(help=f"Model parameters: {', '.join(PRESETS)}, or a .json file of your own.")]
-Policy = Annotated[str, typer.Option(help=f"Policy: {', '.join(POLICIES)}, or module:object of your own.")]
+Preset = Annotated[
+    str,
+    typer.Option(help=f"Model parameters: {', '.join(PRESETS)}, or a .json file of your own.", rich_help_panel=MODEL),
+]
+Policy = Annotated[
+    str, typer.Option(help=f"Policy: {', '.join(POLICIES)}, or module:object of your own.", rich_help_panel=MODEL)
+]
 Settled = Annotated[
     float | None,
-    typer.Option(help="End a trial when the entropy of the verdict is at most this, nats; --actions is then the most."),
+    typer.Option(
+        help="End a trial when the entropy of the verdict is at most this, nats; --actions is then the most.",
+        rich_help_panel=TRIALS,
+    ),
 ]
-Seed = Annotated[int, typer.Option(min=0, help="Seed; test number k uses seed + k.")]
-Actions = Annotated[int, typer.Option(min=1, help="Actions a trial.")]
-Tests = Annotated[int, typer.Option(min=1, help="Number of tests.")]
-Trials = Annotated[int, typer.Option(min=1, help="Trials a test.")]
+Seed = Annotated[int, typer.Option(min=0, help="Seed; test number k uses seed + k.", rich_help_panel=TRIALS)]
+Actions = Annotated[int, typer.Option(min=1, help="Actions a trial.", rich_help_panel=TRIALS)]
+Tests = Annotated[int, typer.Option(min=1, help="Number of tests.", rich_help_panel=TRIALS)]
+Trials = Annotated[int, typer.Option(min=1, help="Trials a test.", rich_help_panel=TRIALS)]
 Jobs = Annotated[
     int | None,
     typer.Option(
-        min=1, help="Processes or threads; the result is the same for any number. All processors if not given."
+        min=1,
+        help="Processes or threads; the result is the same for any number. All processors if not given.",
+        rich_help_panel=RUNNING,
     ),
 ]
 Executor = Annotated[
-    str, typer.Option(help=f"Where tests or runs are done: {EXECUTORS}; the result is the same anywhere.")
+    str,
+    typer.Option(
+        help=f"Where tests or runs are done: {EXECUTORS}; the result is the same anywhere.", rich_help_panel=RUNNING
+    ),
 ]
 Log = Annotated[
-    Path | None, typer.Option(help="Keep each test in this .jsonl file as it ends, and leave out those in it.")
+    Path | None,
+    typer.Option(
+        help="Keep each test in this .jsonl file as it ends, and leave out those in it.", rich_help_panel=RUNNING
+    ),
 ]
 JsonFile = Annotated[
     str | None, typer.Option("--json", help="Write the result as JSON to this file, or - to print it.")
 ]
-Slip = Annotated[float, typer.Option(help="Probability that an action fails and the object stays as it is.")]
-Wrong = Annotated[float, typer.Option(help="Probability that a look shows a pattern drawn at random.")]
-Missing = Annotated[float, typer.Option(help="Probability, a slot, that its symbol is not detected.")]
-Condition = Annotated[
-    str | None, typer.Option(help="What the robot works under: nominal or worn (world robonaut; nominal if not given).")
+Slip = Annotated[
+    float, typer.Option(help="Probability that an action fails and the object stays as it is.", rich_help_panel=WORLD)
 ]
-Urdf = Annotated[Path | None, typer.Option(help="Your own description of the robot, such as NASA's (world robonaut).")]
+Wrong = Annotated[
+    float, typer.Option(help="Probability that a look shows a pattern drawn at random.", rich_help_panel=WORLD)
+]
+Missing = Annotated[
+    float, typer.Option(help="Probability, a slot, that its symbol is not detected.", rich_help_panel=WORLD)
+]
+Condition = Annotated[
+    str | None,
+    typer.Option(
+        help="What the robot works under: nominal or worn (world robonaut; nominal if not given).",
+        rich_help_panel=WORLD,
+    ),
+]
+Urdf = Annotated[
+    Path | None,
+    typer.Option(help="Your own description of the robot, such as NASA's (world robonaut).", rich_help_panel=WORLD),
+]
 
 
 WorldOption = Annotated[
     list[str] | None,
-    typer.Option(help="An option of the world's own, NAME=VALUE, such as n_successors=1; may be given again."),
+    typer.Option(
+        help="An option of the world's own, NAME=VALUE, such as n_successors=1; may be given again.",
+        rich_help_panel=WORLD,
+    ),
 ]
 
 

@@ -1,4 +1,4 @@
-"""``atg-fg structure``: look at what a robot memory has learned of the structure that its objects share."""
+"""``atg-fg memory structure``: look at what a robot memory has learned of the structure that its objects share."""
 
 from __future__ import annotations
 
@@ -22,14 +22,8 @@ from atg_fg.learning.learner import BelievedStructure
 from atg_fg.learning.structured_memory import StructuredMemory
 from atg_fg.storage import memory_files
 
-app = typer.Typer(
-    help="Look at the structure that a robot memory has learned. Example: atg-fg structure show memory.json",
-    no_args_is_help=True,
-)
 
-
-@app.command()
-def show(
+def structure(
     file: options.MemoryFile,
     name: Annotated[str | None, typer.Option("--object", help="Show what is predicted of this object.")] = None,
     plot: Annotated[
@@ -40,7 +34,7 @@ def show(
 ) -> None:
     """Show the learned structure: registers, what actions do to them, rates, and what it predicts of each object.
 
-    Example: atg-fg structure show memory.json --plot structure.png
+    Example: atg-fg memory structure memory.json --plot structure.png
     """
     options.check_json_option(json_file)
     if plot is not None:

@@ -32,7 +32,7 @@ __all__ = [
     "make_policy",
 ]
 
-#: Policies that need nothing but the belief; ``GoalPolicy`` needs a goal, too.
+#: Makers of policies by name, of those that need nothing but the belief; ``GoalPolicy`` needs a goal, too.
 POLICIES: Final[dict[str, Callable[[], Policy]]] = {
     EntropyPolicy.name: EntropyPolicy,
     "lookahead-2": partial(LookaheadPolicy, 2),

@@ -3,7 +3,18 @@ import json
 
 def test_compare_says_for_each_engine_how_exact_it_is(run):
     status, output, error = run(
-        "compare", "--trials", 2, "--actions", 2, "--remembered", 3, "--engines", "gtsam,bayes-filter", "--json", "-"
+        "engines",
+        "compare",
+        "--trials",
+        2,
+        "--actions",
+        2,
+        "--remembered",
+        3,
+        "--engines",
+        "gtsam,bayes-filter",
+        "--json",
+        "-",
     )
     assert (status, error) == (0, "")
     document = json.loads(output)
@@ -18,7 +29,7 @@ def test_compare_says_for_each_engine_how_exact_it_is(run):
 
 def test_compare_prints_a_table(run):
     status, output, error = run(
-        "compare", "--trials", 1, "--actions", 1, "--remembered", 1, "--engines", "bayes-filter"
+        "engines", "compare", "--trials", 1, "--actions", 1, "--remembered", 1, "--engines", "bayes-filter"
     )
     assert (status, error) == (0, "")
     assert "bayes-filter" in output
@@ -26,13 +37,13 @@ def test_compare_prints_a_table(run):
 
 
 def test_calibrate_tests_the_posteriors(run):
-    status, output, error = run("calibrate", "--trials", 60, "--json", "-")
+    status, output, error = run("engines", "check", "--trials", 60, "--json", "-")
     assert (status, error) == (0, "")
     document = json.loads(output)
     assert document["parameters"] == {"engine": "bayes-filter", "trials": 60, "seed": 0}
     assert 0 <= document["chi_square"]["p"] <= 1
     assert len(document["averaged_posterior"]) == len(document["prior"]) == 6
-    status, output, _ = run("calibrate", "--trials", 20)
+    status, output, _ = run("engines", "check", "--trials", 20)
     assert "chi-square" in output
 
 
@@ -59,10 +70,10 @@ def test_explain_draws_the_same_samples_from_the_same_seed(run):
 
 
 def test_bad_options_are_refused(refused):
-    assert "unknown name 'magic'" in refused("compare", "--engines", "magic")
-    assert "unknown name 'magic'" in refused("calibrate", "--engine", "magic")
-    assert "'--trials': Input should be greater than or equal to 2" in refused("calibrate", "--trials", 1)
-    assert "'--trials': Input should be greater than or equal to 1" in refused("compare", "--trials", 0)
+    assert "unknown name 'magic'" in refused("engines", "compare", "--engines", "magic")
+    assert "unknown name 'magic'" in refused("engines", "check", "--engine", "magic")
+    assert "'--trials': Input should be greater than or equal to 2" in refused("engines", "check", "--trials", 1)
+    assert "'--trials': Input should be greater than or equal to 1" in refused("engines", "compare", "--trials", 0)
     assert "'--k': Input should be greater than or equal to 1" in refused(
         "explain", "tests/data/scripted_trial.json", "--k", 0
     )

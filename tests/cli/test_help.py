@@ -1,5 +1,6 @@
 """Help of the command line: each command says what it does and gives an example."""
 
+import re
 import subprocess
 import sys
 
@@ -47,3 +48,20 @@ def test_a_command_whose_source_is_out_of_reach_is_imported_for_its_help(tmp_pat
     command = LazyCommand("count", "offered:count")
     command.read_help()
     assert command.help == "Count."
+
+
+@pytest.mark.parametrize("words", [("compare", "--trials", "1"), ("calibrate",), ("structure", "show", "m.json")])
+def test_a_command_of_an_earlier_version_says_what_it_is_called_now(refused, words):
+    assert f"{words[0]}: this command has another name now; expected atg-fg {cli.MOVED[words[0]]}" in refused(*words)
+
+
+def test_commands_and_long_lists_of_options_stand_in_panels(run, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "100")
+    listed = run("--help")[1]
+    for panel in ("Try it", "Your data", "Memory", "Experiments", "Engines", "Simulation"):
+        assert f" {panel} ─" in listed
+    assert not set(cli.MOVED) & set(re.findall(r"^│ (\w+)", listed, re.MULTILINE))
+    for command in ("table1", "goal"):
+        page = run(command, "--help")[1]
+        for panel in ("World", "Model", "Trials", "Running"):
+            assert f" {panel} ─" in page

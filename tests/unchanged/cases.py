@@ -11,9 +11,9 @@ from typing import Final
 
 #: Where a command of the cases below is found today; the transcripts keep the words on the left.
 COMMAND_WORDS: Final[dict[str, str]] = {
-    "compare": "compare",
-    "calibrate": "calibrate",
-    "structure show": "structure show",
+    "compare": "engines compare",
+    "calibrate": "engines check",
+    "structure show": "memory structure",
 }
 
 EXACT_ENGINES: Final = (
