@@ -47,6 +47,7 @@ notebooks: $(READY)  ## Execute the notebooks, with the sources of their paired 
 	$(BIN)/python notebooks/execute.py
 
 docs: $(READY)  ## Build the documentation site in out/docs; a warning is an error
+	$(BIN)/python docs/floors.py
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs out/docs
 
 # The other scripts in benchmarks/ are about success, not time, and are run by themselves: docs/performance.md.
@@ -145,6 +146,9 @@ example-memory: $(READY)  ## Learn the memory that comes with the package (half 
 			--seed $$seed || exit; \
 	done
 	cp $(EXAMPLE) atg_fg/storage/data/cubes.json
+
+tour: $(READY)  ## Run the commands of docs/tour.md and write down what they print (some ten minutes)
+	$(BIN)/python docs/tour.py
 
 clean:  ## Remove what make has made
 	rm -rf $(VENV) out build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

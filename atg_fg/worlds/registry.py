@@ -15,7 +15,8 @@ from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.worlds.arcube import make_arcubes
 from atg_fg.worlds.base import World
 
-#: Ids of environments by the names that worlds have on the command line. The part before the colon is imported first, so that it can register the id.
+#: Ids of environments by the names of worlds on the command line. The part before the colon is imported first, so
+#: that it can register the id.
 WORLDS: Final[dict[str, str]] = {
     "ideal": "atg_fg.worlds:atg_fg/ARcube-v0",
     "rendered": "sim:sim/RenderedARcube-v0",
