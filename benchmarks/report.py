@@ -7,8 +7,7 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from typing import Any, Final
 
-from benchmarks import matching_cost as matches
-from benchmarks import table1
+from benchmarks import matching_cost, table1
 from benchmarks.lower_bound import floor
 from benchmarks.machine import description
 from benchmarks.measuring import Clock
@@ -65,7 +64,7 @@ def run(
         trials.append(measured)
         floors.append(floor(memory, plan.trial.n_rounds, clock))
         on_part(f"{remaining.pop(0):,} objects" if remaining else "equal matches")
-    equal = matches.measure(*plan.matches, plan.trial.n_rounds, clock)
+    equal = matching_cost.measure(*plan.matches, plan.trial.n_rounds, clock)
     on_part("Table 1")
     document: dict[str, Any] = {
         "format": FORMAT,

@@ -28,7 +28,7 @@ from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence
 from atg_fg.display.figures import GREY, PALETTE, figure_class, plot_style
 from atg_fg.engines import ENGINES, begin_trial
-from atg_fg.experiments.engine_comparison import ComparisonPlan, compare, learned_memory, summarise, total_variation
+from atg_fg.experiments.engine_comparison import ComparisonPlan, compare, summarise, total_variation
 from atg_fg.worlds.arcube import make_arcubes
 from atg_fg.worlds.base import detection_of
 from atg_fg.worlds.registry import make_world
@@ -100,7 +100,7 @@ figure
 # number of particles (seeds 0 to 29), each held against the exact belief. Dots are means, bars their 95 % intervals.
 
 # %%
-memory = learned_memory(plan, np.random.default_rng(0))
+memory = plan.learned_memory(np.random.default_rng(0))
 world = make_world("ideal", cubes=make_arcubes(plan.n_objects, seed=0))
 observation, _ = world.reset(seed=0, options={"object": 2})
 course = []

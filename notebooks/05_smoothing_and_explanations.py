@@ -27,7 +27,7 @@ from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence
 from atg_fg.display.figures import GREY, PALETTE, figure_class, plot_style
 from atg_fg.engines import begin_trial
-from atg_fg.experiments.engine_comparison import ComparisonPlan, learned_memory
+from atg_fg.experiments.engine_comparison import ComparisonPlan
 from atg_fg.inference.explanations import best_explanations, sample_explanations, surprise
 from atg_fg.inference.smoothing import pattern_marginals, smoothed_patterns
 
@@ -41,7 +41,7 @@ from atg_fg.inference.smoothing import pattern_marginals, smoothed_patterns
 # %%
 parameters = ModelParameters(transition_concentration=0.05, observation_noise=0.05, learn_in_trial=False)
 plan = ComparisonPlan(n_objects=10, n_remembered=3, n_learning_actions=20, parameters=parameters)
-memory = learned_memory(plan, np.random.default_rng(0))
+memory = plan.learned_memory(np.random.default_rng(0))
 graph = memory[memory.names[0]]
 patterns = memory.assumptions.alphabet.patterns
 known = list(graph.pattern_indices)

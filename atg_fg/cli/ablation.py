@@ -13,8 +13,7 @@ from atg_fg.cli.experiments import parse_actions, success_with_interval
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.display import figures
 from atg_fg.display.success_plots import plot_ablation
-from atg_fg.experiments import ablation as experiment
-from atg_fg.experiments.ablation import NOISES, VARIANTS, AblationLog, Cell
+from atg_fg.experiments.ablation import NOISES, VARIANTS, AblationLog, Cell, run_ablation, summarise_ablation
 from atg_fg.storage import plain_files
 from atg_fg.worlds.registry import WORLDS
 
@@ -56,8 +55,8 @@ def ablation(
         kept = AblationLog(log, trials)
     with options.progress_bar("tests", len(cells) * tests) as advance:
         seeds = range(seed, seed + tests)
-        results = experiment.run_ablation(cells, seeds, trials, kept, workers, advance, executor)
-    entries = experiment.summarise_ablation(results)
+        results = run_ablation(cells, seeds, trials, kept, workers, advance, executor)
+    entries = summarise_ablation(results)
     parameters = {"tests": tests, "trials": trials, "seed": seed}
     options.write_json({"command": "ablation", "parameters": parameters, "cells": entries}, json_file)
     if plot is not None:

@@ -16,12 +16,11 @@ from atg_fg.core.assumptions import arcube_assumptions
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.records import TrialRecord, TrialStep
-from atg_fg.display import figures
-from atg_fg.display import trial_plots as plots
+from atg_fg.display import figures, trial_plots
 from atg_fg.display.frames import FrameFolder, has_camera
 from atg_fg.engines import begin_trial, check_engine
+from atg_fg.experiments.exploration import learned_memory
 from atg_fg.experiments.trial import learn_from, run_trial
-from atg_fg.learning.structured_memory import memory_for
 from atg_fg.policies import EntropyPolicy, RandomPolicy
 from atg_fg.storage import memory_files, plain_files
 from atg_fg.storage.presets import preset as preset_named
@@ -114,14 +113,8 @@ def learn_beforehand(cubes: Sequence[Cube], parameters: ModelParameters, rng: np
 
     It did so in the ideal world, and knew that each was new.
     """
-    memory = memory_for(parameters, RobotMemory(arcube_assumptions()))
-    with closing(make_world("ideal", cubes=cubes)) as world:
-        for cube in range(N_REMEMBERED):
-            inference = begin_trial("bayes-filter", memory, preset_named("default"))
-            record = run_trial(world, inference, RandomPolicy(), 12, rng, reset_options={"object": cube})
-            name = memory.learn(record.patterns, record.actions, matched=None)
-            memory.learn_shared(name, record.detections, record.actions)
-    return memory
+    assumptions, remembered = arcube_assumptions(), cubes[:N_REMEMBERED]
+    return learned_memory(assumptions, remembered, RandomPolicy(), 12, rng, parameters=parameters)
 
 
 def _save(folder: Path, world: World, record: TrialRecord, memory: RobotMemory, lines: str) -> None:
@@ -131,8 +124,8 @@ def _save(folder: Path, world: World, record: TrialRecord, memory: RobotMemory, 
         figures.save_film(picture, world.metadata["render_fps"], folder / "film.gif")
     elif picture is not None:
         figures.save_image(picture, folder / "frame.png")
-    figures.save_figure(plots.plot_belief(record), folder / "belief.png")
-    figures.save_figure(plots.plot_entropy(record), folder / "entropy.png")
+    figures.save_figure(trial_plots.plot_belief(record), folder / "belief.png")
+    figures.save_figure(trial_plots.plot_entropy(record), folder / "entropy.png")
     plain_files.write_bytes_atomically(folder / "trial.jsonl", lines.encode())
     learn_from(record, memory)
     memory_files.save_memory(memory, folder / "memory.json")

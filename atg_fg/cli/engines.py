@@ -11,8 +11,7 @@ from rich.table import Table
 from atg_fg.cli import options
 from atg_fg.core.errors import unknown_name
 from atg_fg.engines import ENGINES
-from atg_fg.experiments import calibration
-from atg_fg.experiments import engine_comparison as comparison
+from atg_fg.experiments import calibration, engine_comparison
 from atg_fg.storage.presets import preset as preset_named
 
 app = typer.Typer(
@@ -44,7 +43,7 @@ def compare(
     for name in names:
         if name not in ENGINES:
             raise unknown_name("engine", name, ["all", *ENGINES])
-    plan = comparison.ComparisonPlan(
+    plan = engine_comparison.ComparisonPlan(
         n_trials=trials,
         n_actions=actions,
         n_objects=objects,
@@ -53,7 +52,7 @@ def compare(
         world_options=options.world_options(slip, wrong, missing),
     )
     with options.progress_bar("trials", trials) as advance:
-        summary = comparison.summarise(comparison.compare(plan, names, seed, advance))
+        summary = engine_comparison.summarise(engine_comparison.compare(plan, names, seed, advance))
     parameters = {"trials": trials, "objects": objects, "remembered": remembered, "actions": actions, "preset": preset}
     parameters |= {"slip": slip, "wrong": wrong, "missing": missing, "seed": seed}
     options.write_json({"command": "compare", "parameters": parameters, "engines": summary}, json_file)

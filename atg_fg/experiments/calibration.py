@@ -17,7 +17,7 @@ from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, FloatArray
 from atg_fg.engines import begin_trial
-from atg_fg.experiments.engine_comparison import ComparisonPlan, learned_memory
+from atg_fg.experiments.engine_comparison import ComparisonPlan
 from atg_fg.inference.recognition_model import COLLECTION, RecognitionModel
 
 #: Few objects and much noise, so that posteriors of all sizes occur.
@@ -94,7 +94,7 @@ def run_calibration(
         on_trial: Called after each trial.
     """
     memory_seed, *trial_seeds = np.random.SeedSequence(seed).spawn(1 + plan.n_trials)
-    memory = learned_memory(plan, np.random.default_rng(memory_seed))
+    memory = plan.learned_memory(np.random.default_rng(memory_seed))
     posteriors, truths = [], []
     identity = np.eye(len(memory.assumptions.alphabet))
     for trial_seed in trial_seeds:

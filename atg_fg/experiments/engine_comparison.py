@@ -17,7 +17,7 @@ from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, FloatArray
 from atg_fg.core.statistics import wilson_interval
 from atg_fg.engines import ENGINES, begin_trial
-from atg_fg.experiments.trial import run_trial
+from atg_fg.experiments.exploration import learned_memory
 from atg_fg.inference.expected_entropy import best_actions
 from atg_fg.inference.interface import Inference
 from atg_fg.policies import RandomPolicy
@@ -58,6 +58,11 @@ class ComparisonPlan:
         if not 0 <= self.n_remembered <= self.n_objects:
             raise InvalidInputError(f"n_remembered: {self.n_remembered}; expected 0 to {self.n_objects}")
 
+    def learned_memory(self, rng: np.random.Generator) -> RobotMemory:
+        """Return a memory of the first objects, each turned at random in the ideal world."""
+        cubes = make_arcubes(self.n_objects, seed=0)[: self.n_remembered]
+        return learned_memory(arcube_assumptions(self.n_objects), cubes, RandomPolicy(), self.n_learning_actions, rng)
+
 
 @dataclass
 class EngineRecord:
@@ -88,7 +93,7 @@ def compare(
         on_trial: Called after each trial.
     """
     memory_seed, *trial_seeds = np.random.SeedSequence(seed).spawn(1 + plan.n_trials)
-    memory = learned_memory(plan, np.random.default_rng(memory_seed))
+    memory = plan.learned_memory(np.random.default_rng(memory_seed))
     records = {engine: EngineRecord() for engine in engines}
     for trial_seed in trial_seeds:
         course = _drawn_course(plan, memory, np.random.default_rng(trial_seed))
@@ -98,18 +103,6 @@ def compare(
         if on_trial is not None:
             on_trial()
     return records
-
-
-def learned_memory(plan: ComparisonPlan, rng: np.random.Generator) -> RobotMemory:
-    """Return a memory of the plan's first objects, each turned at random in the ideal world."""
-    memory = RobotMemory(arcube_assumptions(plan.n_objects))
-    world = make_world("ideal", cubes=make_arcubes(plan.n_objects, seed=0))
-    for cube in range(plan.n_remembered):
-        inference = begin_trial(REFERENCE, RobotMemory(memory.assumptions), plan.parameters)
-        options = {"object": cube}
-        record = run_trial(world, inference, RandomPolicy(), plan.n_learning_actions, rng, reset_options=options)
-        memory.learn(record.patterns, record.actions, matched=None)
-    return memory
 
 
 def _drawn_course(plan: ComparisonPlan, memory: RobotMemory, rng: np.random.Generator) -> list[tuple[Evidence, int]]:
@@ -135,7 +128,7 @@ def _follow(
     try:
         tried, reference = begin_trial(engine, memory, parameters), begin_trial(REFERENCE, memory, parameters)
         for look, (evidence, action) in enumerate(course):
-            # By turns the first, for the second one finds what it needs in the processor's caches.
+            # Each engine goes first in every other look: the second one finds warm caches.
             pair = [tried, reference] if look % 2 else [reference, tried]
             timed = {id(inference): _timed_decision(inference, evidence) for inference in pair}
             (seconds, expected), (reference_seconds, exact) = timed[id(tried)], timed[id(reference)]

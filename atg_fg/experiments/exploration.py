@@ -1,4 +1,4 @@
-"""A memory for the goal experiment: cubes turned over one by one, or all that there is to know of them."""
+"""Memories of cubes that were turned over one by one, and of all that there is to know of them."""
 
 from __future__ import annotations
 

@@ -31,12 +31,13 @@ _LEAST_LOG_PRODUCT: Final = -600.0
 
 
 class JointRecognitionGraph:
-    """The factor graph of the trials of n objects. Object ``which`` of the arguments has the variable O_{which + 1}.
+    """The factor graph of the trials of n objects that are all different.
+
+    Object ``which`` of the arguments has the variable O_{which + 1}.
 
     Args:
         chains: The tables of each object's trial; all from the same memory.
         n_unseen: U, how many objects the state *unseen* stands for.
-        all_different: Whether the objects are known to be different; if not, the graph falls apart into the trials.
 
     Attributes:
         graph: The ``gtsam.DiscreteFactorGraph``.
@@ -47,7 +48,7 @@ class JointRecognitionGraph:
         TooLargeError: The factor on all objects would have too many entries (``all_different_table``).
     """
 
-    def __init__(self, chains: Sequence[Chain], n_unseen: int, *, all_different: bool = True) -> None:
+    def __init__(self, chains: Sequence[Chain], n_unseen: int) -> None:
         n_states = {len(chain.prior) for chain in chains}
         if len(n_states) != 1 or n_unseen < 1:
             raise InvalidInputError(
@@ -59,10 +60,8 @@ class JointRecognitionGraph:
         self.graph: FactorGraph = gtsam.DiscreteFactorGraph()
         for trial in self.trials:
             self.graph.push_back(trial.graph)
-        self._different: FloatArray | None = None
-        if all_different:
-            self._different = all_different_table(len(chains), n_states.pop() - 1, n_unseen)
-            self.graph.push_back(factors.factor(self._object_keys, self._different))
+        self._different = all_different_table(len(chains), n_states.pop() - 1, n_unseen)
+        self.graph.push_back(factors.factor(self._object_keys, self._different))
 
     @property
     def _object_keys(self) -> list[int]:
@@ -75,8 +74,6 @@ class JointRecognitionGraph:
             ImpossibleEvidenceError: The evidence of an object, or of all of them together, has probability zero.
         """
         alone = [trial.identity() for trial in self.trials]
-        if self._different is None:
-            return alone
         # Where each object is next to surely the same one, what is left may be less than GTSAM's numbers hold.
         least = sum(float(log_of(belief.probabilities).min()) for belief in alone)
         marginals = self._marginals_by_elimination() if least > _LEAST_LOG_PRODUCT else self._marginals_of_logarithms()
@@ -110,19 +107,16 @@ class JointRecognitionGraph:
 
     def _log_joint(self, log_weights: list[FloatArray]) -> FloatArray:
         """Return the logarithm of the factor times weights of each object, shape [H] · n."""
-        assert self._different is not None
         together: FloatArray = reduce(np.add.outer, log_weights) + log_of(self._different)
         return together
 
     def log_evidence(self) -> float:
-        """Return ln p(z of all objects | a), given that they are all different if the graph says so.
+        """Return ln p(z of all objects | a), given that they are all different.
 
         Raises:
             ImpossibleEvidenceError: The evidence of an object, or of all of them together, has probability zero.
         """
         log_joints = [trial.log_joint() for trial in self.trials]
-        if self._different is None:
-            return sum(map(log_sum_exp, log_joints))
         log_evidence = log_sum_exp(self._log_joint(log_joints))
         if not np.isfinite(log_evidence):
             raise impossible()

@@ -16,7 +16,7 @@ from atg_fg.core.errors import InvalidInputError, TooLargeError
 from atg_fg.core.patterns import Evidence, FloatArray, PatternAlphabet
 from atg_fg.inference.chain import Chain, forward_pass
 from atg_fg.inference.history import History
-from atg_fg.learning import register_contents as soft
+from atg_fg.learning import register_contents
 from atg_fg.learning.rates import Rates
 from atg_fg.learning.raw_trials import RawTrial
 from atg_fg.learning.shared_structure import Poses, SharedStructure
@@ -33,11 +33,11 @@ def pose_patterns(poses: Poses, contents: FloatArray, rates: Rates, alphabet: Pa
         rates: Of them κ is used, where a register is not known for certain.
         alphabet: The patterns.
     """
-    shown = soft.symbol_probabilities(contents, rates.repeat)
+    shown = register_contents.symbol_probabilities(contents, rates.repeat)
     in_view = poses.registers[:, : len(alphabet.slots)]
     by_slot = [shown[:, registers].reshape(-1, alphabet.n_symbols) for registers in in_view.T]
-    different = soft.distinctness(by_slot, alphabet.symbols)
-    patterns: FloatArray = soft.pattern_products(by_slot, alphabet.symbols) / different[:, None]
+    different = register_contents.distinctness(by_slot, alphabet.symbols)
+    patterns: FloatArray = register_contents.pattern_products(by_slot, alphabet.symbols) / different[:, None]
     possible = poses.possible(len(alphabet.slots))[:, None]
     return patterns.reshape(len(contents), len(poses.registers), len(alphabet)) * possible
 

@@ -18,8 +18,17 @@ from numpy.typing import NDArray
 
 from atg_fg.core.log_math import log_sum_exp
 from atg_fg.core.patterns import FloatArray, IntArray, PatternAlphabet
-from atg_fg.learning import register_contents as soft
 from atg_fg.learning.rates import Rates
+from atg_fg.learning.register_contents import (
+    SAME,
+    TINY,
+    distinctness,
+    pattern_products,
+    reveal,
+    reweigh,
+    symbol_probabilities,
+    unrevealed,
+)
 from atg_fg.learning.shared_structure import Poses
 
 #: Rows less probable than this are dropped.
@@ -110,7 +119,7 @@ class PoseFilter:
         weight = np.where(is_known[owner], 1.0 / n_poses, poses.first_weights[start])
         self.rows = Rows(owner, start, pose, weight, owner, np.zeros((len(owner), 4)))
         self._contents = contents
-        self._shown = soft.symbol_probabilities(contents, rates.repeat)
+        self._shown = symbol_probabilities(contents, rates.repeat)
         self._possible = poses.possible(len(alphabet.slots))
         self.log_evidence = np.zeros(n_owners)
 
@@ -139,20 +148,20 @@ class PoseFilter:
         rows = self.rows
         seen = np.broadcast_to(symbols, (len(self.log_evidence), symbols.shape[-1]))[rows.owner]
         registers, shown = self._in_view(rows)
-        probability = self._possible[rows.pose] / soft.distinctness(shown, self._alphabet.symbols)
+        probability = self._possible[rows.pose] / distinctness(shown, self._alphabet.symbols)
         index = np.arange(len(rows.owner))
         for slot, probabilities in enumerate(shown):
             probability *= probabilities[index, seen[:, slot]]
         kept, truth = self._condition(probability, np.ones(1))
-        right = np.flatnonzero(truth > soft.SAME)
+        right = np.flatnonzero(truth > SAME)
         source, tables = kept[right], self._contents[self.rows.table[right]]
         seen, index = seen[source], np.arange(len(right))
         known = np.ones(len(right), dtype=bool)
         for slot, probabilities in enumerate(shown):
             register, expected = registers[source, slot], probabilities[source]
             before = tables[index, register]
-            known &= before[index, seen[:, slot]] > 1.0 - soft.SAME
-            tables[index, register], revealed = soft.reveal(before, expected, seen[:, slot], truth[right])
+            known &= before[index, seen[:, slot]] > 1.0 - SAME
+            tables[index, register], revealed = reveal(before, expected, seen[:, slot], truth[right])
             self._count_reveals(right, before, expected, revealed)
         self._merge(tables[~known], right[~known])
 
@@ -161,11 +170,11 @@ class PoseFilter:
         rows, symbols = self.rows, self._alphabet.symbols
         likelihood = np.broadcast_to(likelihood, (len(self.log_evidence), len(symbols)))
         registers, shown = self._in_view(rows)
-        joint = soft.pattern_products(shown, symbols) / soft.distinctness(shown, symbols)[:, None]
+        joint = pattern_products(shown, symbols) / distinctness(shown, symbols)[:, None]
         joint *= self._possible[rows.pose, None] * likelihood[rows.owner]
         probability = joint.sum(axis=1)
         kept, truth = self._condition(probability, likelihood.sum(axis=1))
-        right = np.flatnonzero(truth > soft.SAME)
+        right = np.flatnonzero(truth > SAME)
         source, tables = kept[right], self._contents[self.rows.table[right]]
         joint = joint[source] / probability[source, None]
         one_hot = [symbols[:, slot, None] == np.arange(self._alphabet.n_symbols) for slot in range(len(shown))]
@@ -175,7 +184,7 @@ class PoseFilter:
             register, expected = registers[source, slot], shown[slot][source]
             before = tables[index, register]
             taken = sum((each for other, each in enumerate(posteriors) if other != slot), np.zeros_like(posterior))
-            tables[index, register], revealed = soft.reweigh(before, expected, posterior, taken, truth[right])
+            tables[index, register], revealed = reweigh(before, expected, posterior, taken, truth[right])
             self._count_reveals(right, before, expected, revealed)
         self._merge(tables, right)
 
@@ -277,8 +286,8 @@ class PoseFilter:
         """
         if self._log_weights is not None:
             return
-        from_all = self._rates.repeat / self._alphabet.n_symbols * soft.unrevealed(before[:, None, :])
-        share = np.minimum(from_all / np.maximum(shown - before, soft.TINY), 1.0)
+        from_all = self._rates.repeat / self._alphabet.n_symbols * unrevealed(before[:, None, :])
+        share = np.minimum(from_all / np.maximum(shown - before, TINY), 1.0)
         self.rows.events[rows, REVEAL] += revealed.sum(axis=1)
         self.rows.events[rows, REPEAT] += (revealed * share).sum(axis=1)
 
@@ -309,7 +318,7 @@ class PoseFilter:
             merged[mixed] = n_old + len(changed) + np.arange(len(starts))
         used, table = np.unique(merged, return_inverse=True)
         self._contents = np.concatenate(contents)[used]
-        shown = soft.symbol_probabilities(self._contents[used >= n_old], self._rates.repeat)
+        shown = symbol_probabilities(self._contents[used >= n_old], self._rates.repeat)
         self._shown = np.concatenate((self._shown[used[used < n_old]], shown))
         last = order[first]
         self.rows = Rows(rows.owner[last], rows.start[last], rows.pose[last], weight, table, events)
@@ -318,7 +327,7 @@ class PoseFilter:
         """Return the weighted sum of what rows show, for each owner, shape [I, |𝒵|]."""
         _, shown = self._in_view(rows)
         symbols = self._alphabet.symbols
-        shown[0] = shown[0] * (weights * self._possible[rows.pose] / soft.distinctness(shown, symbols))[:, None]
+        shown[0] = shown[0] * (weights * self._possible[rows.pose] / distinctness(shown, symbols))[:, None]
         combined = shown[0]
         for probabilities in shown[1:]:
             combined = (combined[:, :, None] * probabilities[:, None, :]).reshape(len(combined), -1)

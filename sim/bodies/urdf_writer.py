@@ -11,11 +11,16 @@ from xml.etree import ElementTree
 import numpy as np
 
 from atg_fg.core.patterns import FloatArray
-from sim.bodies import robonaut_shapes as shell
+from sim.bodies import robonaut_shapes
 from sim.bodies.robonaut_joints import NECK, SIDES, WAIST, Joint, arm
 from sim.bodies.robonaut_shapes import Shape
 
-_MATERIALS: Final = {shell.WHITE: "white", shell.GREY: "grey", shell.DARK: "dark", shell.GOLD: "gold"}
+_MATERIALS: Final = {
+    robonaut_shapes.WHITE: "white",
+    robonaut_shapes.GREY: "grey",
+    robonaut_shapes.DARK: "dark",
+    robonaut_shapes.GOLD: "gold",
+}
 
 
 #: How round each kind of shape is seen, lengthwise and around: 1 is a ball, towards 0 a box.
@@ -37,15 +42,15 @@ def robot_urdf() -> str:
     for colour, name in _MATERIALS.items():
         material = ElementTree.SubElement(robot, "material", name=name)
         ElementTree.SubElement(material, "color", rgba=colour)
-    _add_link(robot, "base", np.zeros(3), shell.pedestal_shapes(), mass=60.0)
-    _add_joint(robot, WAIST, "base", np.zeros(3), shell.torso_shapes())
+    _add_link(robot, "base", np.zeros(3), robonaut_shapes.pedestal_shapes(), mass=60.0)
+    _add_joint(robot, WAIST, "base", np.zeros(3), robonaut_shapes.torso_shapes())
     parent, origin = WAIST.name, WAIST.position
     for number, joint in enumerate(NECK):
-        _add_joint(robot, joint, parent, origin, shell.neck_shapes(number))
+        _add_joint(robot, joint, parent, origin, robonaut_shapes.neck_shapes(number))
         parent, origin = joint.name, joint.position
     for side in SIDES:
         parent, origin = WAIST.name, WAIST.position
-        for joint, shapes in zip(arm(side), shell.arm_shapes(side), strict=True):
+        for joint, shapes in zip(arm(side), robonaut_shapes.arm_shapes(side), strict=True):
             _add_joint(robot, joint, parent, origin, shapes)
             parent, origin = joint.name, joint.position
     ElementTree.indent(robot)

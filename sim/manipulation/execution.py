@@ -14,7 +14,7 @@ from sim.bodies.cube import CUBE_CENTRE
 from sim.bodies.kinematics import cross
 from sim.bodies.robonaut_joints import PAD_RADIUS
 from sim.bodies.robot import HOME_POSTURE, TUCKED_POSTURE, RobotBody
-from sim.manipulation import waypoints as plans
+from sim.manipulation import waypoints
 from sim.manipulation.impedance_control import TIME_STEP, ArmController, JointTarget
 from sim.manipulation.inverse_kinematics import Solution, solve
 from sim.manipulation.waypoints import INWARD, Waypoint
@@ -68,18 +68,18 @@ class Manipulator:
             OutOfReachError: The cube is seen where the hands cannot hold it.
         """
         if action == "flip":
-            self._follow(plans.flip(self.look()))
+            self._follow(waypoints.flip(self.look()))
         else:
             direction = 1 if action == "left" else -1
-            self._follow(plans.turn_to_halfway(self.look(), direction))
-            self._follow(plans.turn_from_halfway(self.look(), direction))
+            self._follow(waypoints.turn_to_halfway(self.look(), direction))
+            self._follow(waypoints.turn_from_halfway(self.look(), direction))
         self.go_home()
         for _ in range(_MOST_SQUARINGS):
             cube = self.look()
             if cube.is_square:
                 break
             self.squarings += 1
-            self._follow(plans.square(cube))
+            self._follow(waypoints.square(cube))
             self.go_home()
 
     def _follow(self, waypoints: Iterable[Waypoint]) -> None:

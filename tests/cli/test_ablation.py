@@ -40,7 +40,7 @@ def test_other_worlds_have_panels_of_their_own(run):
         (["--noises", "loud"], "'loud'"),
         (["--worlds", "moon"], "'moon'"),
         (["--actions", "0"], "--actions: '0'"),
-        (["--tests", "0"], "--tests: 0"),
+        (["--tests", "0"], "'--tests': Input should be greater than or equal to 1"),
         (["--plot", "curves.gif"], "suffix 'gif'"),
         (["--log", "/nowhere/at/all.jsonl"], "/nowhere/at/all.jsonl"),
     ],

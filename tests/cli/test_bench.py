@@ -63,7 +63,7 @@ def test_what_cannot_be_is_refused_before_anything_is_measured(refused, folder, 
     bare.write_text("nothing to fill\n")
     assert "expected a line <!-- atg-fg bench: begin -->" in refused("bench", "--markdown", bare)
     assert "--sizes: '0'; expected whole numbers" in refused("bench", "--sizes", "10,0")
-    assert "--rounds: 0" in refused("bench", "--rounds", 0)
+    assert "'--rounds': Input should be greater than or equal to 1" in refused("bench", "--rounds", 0)
     assert "cannot be written" in refused("bench", "--json", tmp_path / "no" / "file.json")
     other = tmp_path / "other.json"
     for text, said in (("[1]", "not written by atg-fg bench"), ("{", "not JSON"), ("{}", "not written by")):

@@ -38,9 +38,9 @@ def test_pictures_and_a_film_are_written(run, tmp_path):
 
 def test_bad_options_are_refused(refused, tmp_path):
     assert "condition: unknown name 'new'" in refused("sim", "reliability", "--condition", "new")
-    assert "--actions: 0" in refused("sim", "reliability", "--actions", 0)
-    assert "--jobs: 0" in refused("sim", "reliability", "--jobs", 0)
-    assert "--stations: 0" in refused("sim", "reliability", "--stations", 0)
+    assert "'--actions': Input should be greater than or equal to 1" in refused("sim", "reliability", "--actions", 0)
+    assert "'--jobs': Input should be greater than or equal to 1" in refused("sim", "reliability", "--jobs", 0)
+    assert "'--stations': Input should be greater than or equal to 1" in refused("sim", "reliability", "--stations", 0)
     assert "n_stations: 6" in refused("sim", "reliability", "--stations", 6, "--actions", 1, "--jobs", 1)
     assert "nowhere.urdf" in refused("sim", "reliability", "--urdf", "nowhere.urdf", "--actions", 1, "--jobs", 1)
     assert "nowhere.json" in refused("sim", "calibrate", "nowhere.json")

@@ -14,7 +14,6 @@ from atg_fg.experiments.calibration import (
     run_calibration,
     summarise,
 )
-from atg_fg.experiments.engine_comparison import learned_memory
 
 QUICK = replace(PLAN, n_trials=400)
 
@@ -51,7 +50,7 @@ def test_five_thousand_trials_are_calibrated_to_two_hundredths(engine):
 
 
 def test_drawn_trials_follow_the_prior_and_the_model():
-    memory = learned_memory(PLAN, np.random.default_rng(0))
+    memory = PLAN.learned_memory(np.random.default_rng(0))
     rng = np.random.default_rng(1)
     drawn = [draw_trial(memory, ModelParameters(1e-8, 1e-8), 4, rng) for _ in range(300)]
     shares = np.bincount([hypothesis for hypothesis, _, _ in drawn], minlength=6) / 300

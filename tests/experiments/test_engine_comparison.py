@@ -3,7 +3,7 @@ import pytest
 
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.engines import ENGINES
-from atg_fg.experiments.engine_comparison import REFERENCE, ComparisonPlan, compare, learned_memory, summarise
+from atg_fg.experiments.engine_comparison import REFERENCE, ComparisonPlan, compare, summarise
 
 SMALL = ComparisonPlan(n_trials=3, n_actions=3, n_objects=6, n_remembered=3, n_learning_actions=4)
 
@@ -43,7 +43,7 @@ def test_the_same_seed_compares_the_same_trials():
 
 
 def test_the_memory_holds_the_plans_objects():
-    memory = learned_memory(SMALL, np.random.default_rng(0))
+    memory = SMALL.learned_memory(np.random.default_rng(0))
     assert len(memory) == 3
     assert all(1 < graph.n_known <= 5 for graph in memory)
 

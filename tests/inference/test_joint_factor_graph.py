@@ -33,8 +33,8 @@ def two_objects(n_objects: int = 4) -> RobotMemory:
     return RobotMemory(world, [graph(world, "A", [(0,), (1,)], *swaps), graph(world, "B", [(1,), (2,)], *swaps)])
 
 
-def joint(*trials: Inference, all_different: bool = True) -> JointRecognitionGraph:
-    return JointRecognitionGraph([t.chain() for t in trials], trials[0].model.n_unseen, all_different=all_different)
+def joint(*trials: Inference) -> JointRecognitionGraph:
+    return JointRecognitionGraph([t.chain() for t in trials], trials[0].model.n_unseen)
 
 
 def three_trials(memory: RobotMemory, parameters: ModelParameters = NOISY) -> list[Inference]:
@@ -148,23 +148,6 @@ def test_the_graph_is_the_sum_over_subsets(case: Case, n: int) -> None:
     assert recognition.log_evidence() == pytest.approx(expected, rel=1e-12, abs=1e-12)
 
 
-@settings(max_examples=30)
-@given(cases(), st.integers(1, 3))
-def test_without_the_factor_the_objects_are_as_in_separate_trials(case: Case, n: int) -> None:
-    trials = trials_of(case, n)
-    recognition = joint(*trials, all_different=False)
-    marginals = recognition.marginals()
-    for which, inference in enumerate(trials):
-        expected = inference.identity().probabilities
-        close(recognition.identities()[which].probabilities, expected)
-        by_gtsam = marginals.marginalProbabilities(recognition.trials[which].variable(object_key(which + 1)))
-        close(by_gtsam[: len(expected)], expected)
-        last = recognition.trials[which].last
-        close(recognition.aspect_marginal(which, last), inference.aspect_belief)
-    total = sum(inference.log_evidence for inference in trials)
-    assert recognition.log_evidence() == pytest.approx(total, rel=1e-12, abs=1e-12)
-
-
 def test_marginals_of_gtsam_itself_are_those_of_the_graph() -> None:
     recognition = joint(*three_trials(two_objects()))
     marginals = recognition.marginals()
@@ -179,11 +162,10 @@ def test_marginals_of_gtsam_itself_are_those_of_the_graph() -> None:
 
 def test_one_object_alone_is_as_in_its_trial() -> None:
     inference = trial("bayes-filter", two_objects(), NOISY, 0, 0, 1)
-    for all_different in (True, False):
-        recognition = joint(inference, all_different=all_different)
-        close(recognition.identities()[0].probabilities, inference.identity().probabilities)
-        close(recognition.aspect_marginal(0, 1), inference.aspect_belief)
-        assert recognition.log_evidence() == pytest.approx(inference.log_evidence, abs=1e-14)
+    recognition = joint(inference)
+    close(recognition.identities()[0].probabilities, inference.identity().probabilities)
+    close(recognition.aspect_marginal(0, 1), inference.aspect_belief)
+    assert recognition.log_evidence() == pytest.approx(inference.log_evidence, abs=1e-14)
 
 
 def test_recognising_one_object_informs_the_others() -> None:
@@ -241,7 +223,6 @@ def test_a_graph_too_large_for_the_factor_is_refused() -> None:
     chain = Chain(prior, np.ones((200, 1)), (), (np.ones((200, 1)),))
     with pytest.raises(TooLargeError, match="different_identities"):
         JointRecognitionGraph([chain] * 3, 10)
-    assert len(JointRecognitionGraph([chain] * 3, 10, all_different=False).trials) == 3
 
 
 def test_no_chain_and_chains_of_different_memories_are_refused() -> None:
