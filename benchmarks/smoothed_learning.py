@@ -11,18 +11,18 @@ import math
 import statistics
 import sys
 import tempfile
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 from rich.console import Console
 from rich.table import Table
 
 from atg_fg.core.assumptions import arcube_assumptions
-from atg_fg.core.patterns import Evidence
+from atg_fg.core.records import TrialSummary
 from atg_fg.experiments.table1 import TestPlan, run_test
-from atg_fg.storage.trial_log import read_trials
+from atg_fg.storage.recorded_test import recorded_tests
 
 PLAN = TestPlan(engine="bayes-filter", world_options={"missing": 0.1})
 MEASURES = (
@@ -34,20 +34,18 @@ MEASURES = (
 )
 
 
-def quality(trials: list[dict[str, Any]]) -> tuple[float, ...]:
+def quality(trials: Sequence[TrialSummary]) -> tuple[float, ...]:
     """Return the last four measures of a test from its records."""
     alphabet = arcube_assumptions().alphabet
     owner: dict[str, object] = {}
     sound: dict[str, bool] = {}
     right = wrong = transitions = 0
     for trial in trials:
-        if trial["verdict"] not in ("known", "novel"):
+        if trial.verdict not in ("known", "novel"):
             continue
-        seen = [Evidence.of_detection(alphabet, tuple(look)).pattern for look in trial["observed"]]
-        learned = trial.get("learned", seen)
-        name = trial["matched"] if trial["verdict"] == "known" else f"object-{len(owner):03}"
-        truth = [alphabet.patterns.index(tuple(look["pattern"])) for look in trial["truth"]]
-        presented = trial["truth"][0]["object"]
+        learned, presented = trial.patterns, trial.object
+        name = trial.matched or f"object-{len(owner):03}"
+        truth = [alphabet.patterns.index(tuple(step.truth["pattern"])) for step in trial.steps]
         owner.setdefault(name, presented)
         good = [pattern == shown and owner[name] == presented for pattern, shown in zip(learned, truth, strict=True)]
         known = [pattern is not None for pattern in learned]
@@ -63,7 +61,7 @@ def measured(plan: TestPlan, seed: int) -> tuple[float, ...]:
     with tempfile.TemporaryDirectory() as folder:
         result = run_test(plan, seed, Path(folder))
         (file,) = Path(folder).iterdir()
-        return (100 * result.success[0] / result.success[1], *quality(read_trials(file)))
+        return (100 * result.success[0] / result.success[1], *quality(recorded_tests(file)[0].trials))
 
 
 def main() -> None:

@@ -13,7 +13,7 @@ from atg_fg.storage.database.copying import records_in_log
 from atg_fg.storage.memory_files import open_memory
 from atg_fg.storage.presets import preset
 from atg_fg.storage.scripted_trial import read_script
-from atg_fg.storage.trial_log import read_trials
+from atg_fg.storage.trial_log import read_log, to_line
 
 FORMATS = Path(__file__).parent / "data" / "formats"
 
@@ -48,10 +48,10 @@ def test_database_schema_1(tmp_path: Path) -> None:
 
 
 def test_test_1() -> None:
-    assert [line["verdict"] for line in read_trials(FORMATS / "test-1.jsonl.gz")] == ["novel", "novel"]
+    assert [line["verdict"] for line in read_log(FORMATS / "test-1.jsonl.gz")[1]] == ["novel", "novel"]
     experiment, trials = records_in_log(FORMATS / "test-1.jsonl.gz")
     assert (experiment.seed, experiment.parameters) == (3, {"world": "ideal"})
-    assert [trial.line() for trial in trials] == read_trials(FORMATS / "test-1.jsonl.gz")
+    assert [to_line(trial) for trial in trials] == read_log(FORMATS / "test-1.jsonl.gz")[1]
 
 
 def test_goal_run_1() -> None:

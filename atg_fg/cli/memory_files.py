@@ -12,7 +12,7 @@ import typer
 from atg_fg.cli import options
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
-from atg_fg.core.records import Experiment, StoredTrial
+from atg_fg.core.records import Experiment, TrialSummary
 from atg_fg.learning.completion import completed_atg
 from atg_fg.learning.memory_union import unite
 from atg_fg.learning.structured_memory import StructuredMemory
@@ -25,6 +25,7 @@ from atg_fg.storage.database.trial_log import read_stored_trials
 from atg_fg.storage.graph_export import view_to_dot, view_to_graphml
 from atg_fg.storage.memory_difference import difference
 from atg_fg.storage.memory_files import load_memory
+from atg_fg.storage.trial_log import to_line
 
 GRAPH_FORMATS: Final = {"graphml": view_to_graphml, "dot": view_to_dot}
 EXPORTS: Final = (*GRAPH_FORMATS, "json", "trials")
@@ -83,7 +84,7 @@ def _trials_text(file: Path) -> str:
     if not is_database(file):
         raise InvalidInputError(f"--format trials: {file} is no database; expected one, since JSON holds no trials")
     lines = (
-        {"experiment": trial.experiment, "number": trial.number, "learned": trial.learned, "trial": trial.line()}
+        {"experiment": trial.experiment, "number": trial.number, "learned": trial.learned, "trial": to_line(trial)}
         for trial in read_stored_trials(file)
     )
     return "".join(json.dumps(line, allow_nan=False) + "\n" for line in lines)
@@ -108,7 +109,7 @@ def import_files(
 
 def _import(files: list[Path], into: Path) -> None:
     logs = [file for file in files if _is_log(file)]
-    records: list[list[tuple[Experiment | None, list[StoredTrial]]]] = [[records_in_log(file)] for file in logs]
+    records: list[list[tuple[Experiment | None, list[TrialSummary]]]] = [[records_in_log(file)] for file in logs]
     records += [list(records_in(file)) for file in files if is_database(file)]
     memories = [load_memory(file) for file in files if file not in logs and _has_memory(file)]
     full = [memory for memory in memories if len(memory)] or memories[:1]

@@ -9,20 +9,22 @@ import typer
 from rich.table import Table
 
 from atg_fg.cli import options
-from atg_fg.core.assumptions import arcube_assumptions
 from atg_fg.engines import check_engine
 from atg_fg.experiments.rescore import rescore as judged_anew
 from atg_fg.experiments.scores import pooled_interval
 from atg_fg.storage.presets import preset as preset_named
+from atg_fg.storage.recorded_test import recorded_tests
 
 
 def rescore(
-    files: Annotated[list[Path], typer.Argument(help="Tests that table1 --records wrote.", show_default=False)],
+    files: Annotated[
+        list[Path], typer.Argument(help="Tests that table1 --records wrote: logs or a database.", show_default=False)
+    ],
     preset: options.Preset = "learned",
     engine: options.PresetsEngine = None,
     json_file: options.JsonFile = None,
 ) -> None:
-    """Judge recorded tests of ARcubes once more, from the same looks and actions, by another model.
+    """Judge recorded tests once more, from the same looks and actions, by another model.
 
     Example: atg-fg rescore results/robonaut/nominal_default/test-0000.jsonl.gz --preset learned
     """
@@ -30,7 +32,8 @@ def rescore(
     parameters = preset_named(preset)
     engine = options.engine_of(engine, parameters, "bayes-filter")
     check_engine(engine, parameters)
-    results = {str(file): judged_anew(file, arcube_assumptions(), engine, parameters) for file in files}
+    recorded = [test for file in files for test in recorded_tests(file)]
+    results = {test.place: judged_anew(test, engine, parameters) for test in recorded}
     tests = [
         {
             "file": file,

@@ -17,7 +17,7 @@ from atg_fg.cli.story import Story
 from atg_fg.core.assumptions import arcube_assumptions
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
-from atg_fg.core.records import Experiment, StoredTrial, TrialStep
+from atg_fg.core.records import Experiment, TrialStep, TrialSummary
 from atg_fg.core.version import __version__
 from atg_fg.display.frames import FrameFolder
 from atg_fg.engines import begin_trial
@@ -111,7 +111,7 @@ def trial(
         learned = learn_from(result, remembered)
         if save_memory is not None:
             experiment = Experiment("trial", about, seed, __version__)
-            save_trial(remembered, save_memory, StoredTrial.of(result, learned), experiment)
+            save_trial(remembered, save_memory, TrialSummary.of(result, learned), experiment)
     steps = [json.loads(line) for line in lines.splitlines()[1:-1]]
     document = {
         "command": "trial",

@@ -11,7 +11,7 @@ import numpy as np
 from atg_fg.core.assumptions import MAX_NUMBER, Assumptions
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import IntArray, Pattern
-from atg_fg.core.table import Cell, HtmlTable, _symbols, shortened
+from atg_fg.core.table import Cell, Table, shortened, symbols_text
 
 #: Node of the networkx view that stands for all unobserved aspects.
 COLLECTION_NODE = "collection"
@@ -216,8 +216,27 @@ class AspectTransitionGraph:
 
     __hash__ = None  # type: ignore[assignment]  # mypy's usual complaint; graphs grow, so they are no keys
 
+    def table(self) -> Table:
+        """Return the known aspects, and where each action was seen to lead."""
+        assumptions, aspects = self.assumptions, self.aspects
+        ways: dict[tuple[int, int], list[str]] = {}
+        for (source, action, target), count in sorted(self._counts.items()):
+            times = "" if count == 1 else f" ×{count}"
+            ways.setdefault((source, action), []).append(f"{symbols_text(aspects[target])}{times}")
+        rows: list[tuple[Cell, ...]] = [
+            (
+                symbols_text(pattern),
+                *("; ".join(ways.get((aspect, action), ["·"])) for action in range(len(assumptions.actions))),
+            )
+            for aspect, pattern in enumerate(aspects)
+        ]
+        title = f"{self.name}: {self.n_known} of {assumptions.n_aspects} aspects, {len(self._counts)} observed edges"
+        headings = (f"aspect ({', '.join(assumptions.alphabet.slots)})", *assumptions.actions)
+        note = f"· not yet tried; collection node: {self.n_unobserved} unobserved"
+        return Table(title, headings if rows else (), shortened(rows, _ASPECTS, "aspects"), note)
+
     def _repr_html_(self) -> str:
-        return graph_view(self)._repr_html_()
+        return self.table()._repr_html_()
 
     def __repr__(self) -> str:
         return (
@@ -228,23 +247,3 @@ class AspectTransitionGraph:
 
 #: Rows that are shown of a long table.
 _ASPECTS: Final = 24
-
-
-def graph_view(graph: AspectTransitionGraph) -> HtmlTable:
-    """Return a table of the known aspects, and of where each action was seen to lead."""
-    assumptions, aspects = graph.assumptions, graph.aspects
-    ways: dict[tuple[int, int], list[str]] = {}
-    for (source, action, target), count in sorted(graph.counts.items()):
-        times = "" if count == 1 else f" ×{count}"
-        ways.setdefault((source, action), []).append(f"{_symbols(aspects[target])}{times}")
-    rows: list[tuple[Cell, ...]] = [
-        (
-            _symbols(pattern),
-            *("; ".join(ways.get((aspect, action), ["·"])) for action in range(len(assumptions.actions))),
-        )
-        for aspect, pattern in enumerate(aspects)
-    ]
-    title = f"{graph.name}: {graph.n_known} of {assumptions.n_aspects} aspects, {len(graph.counts)} observed edges"
-    headings = (f"aspect ({', '.join(assumptions.alphabet.slots)})", *assumptions.actions)
-    note = f"· not yet tried; collection node: {graph.n_unobserved} unobserved"
-    return HtmlTable(title, headings if rows else (), shortened(rows, _ASPECTS, "aspects"), note)

@@ -11,7 +11,7 @@ import numpy as np
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.log_math import x_log_x
 from atg_fg.core.patterns import FloatArray
-from atg_fg.core.table import Bar, Cell, HtmlTable
+from atg_fg.core.table import Bar, Cell, Table
 
 #: Objects that a table shows one by one.
 SHOWN: Final = 5
@@ -162,7 +162,7 @@ class BeliefTable:
         for index in np.argsort(-self.belief.objects, kind="stable"):
             yield self.names[index], float(self.belief.objects[index])
 
-    def table(self) -> HtmlTable:
+    def table(self) -> Table:
         """Return the table that is shown: the best objects, all others together, and *unseen*."""
         best = [pair for _, pair in zip(range(self.shown), self, strict=False)]
         rows: list[tuple[Cell, ...]] = [(name, _probability(value)) for name, value in best]
@@ -172,7 +172,7 @@ class BeliefTable:
             rows.append((f"{others} {'other' if others == 1 else 'others'}", _probability(rest)))
         rows.append((f"unseen ({self.belief.n_unseen} never met)", _probability(self.unseen)))
         note = f"entropy {self.belief.entropy:.3f} nats; judged {self._verdict()}"
-        return HtmlTable("Belief over identity", ("object", "probability"), tuple(rows), note)
+        return Table("Belief over identity", ("object", "probability"), tuple(rows), note)
 
     def _verdict(self) -> str:
         best = self.belief.most_probable_object

@@ -10,7 +10,7 @@ from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.merging import Merge, check_merges
 from atg_fg.core.patterns import Detection
-from atg_fg.core.table import Bar, Cell, HtmlTable
+from atg_fg.core.table import Bar, Cell, Table
 from atg_fg.core.transactions import Persistent, one_transaction
 
 
@@ -187,29 +187,32 @@ class RobotMemory(Persistent):
 
     __hash__ = None  # type: ignore[assignment]
 
+    def table(self) -> Table:
+        """Return the remembered objects, the first ones of many."""
+        assumptions = self.assumptions
+        rows: list[tuple[Cell, ...]] = []
+        # The last ones are not looked at: a memory may hold very many.
+        for _, graph in zip(range(_OBJECTS), self, strict=False):
+            aspects = Bar(graph.n_known / assumptions.n_aspects, f"{graph.n_known} of {assumptions.n_aspects}")
+            rows.append((graph.name, aspects, str(len(graph.counts)), str(sum(graph.counts.values()))))
+        if len(self) > len(rows):
+            rows.append((f"… and {len(self) - len(rows)} other objects", "", "", ""))
+        title = f"Robot memory: {len(self)} of {assumptions.n_objects} objects"
+        headings = ("object", "known aspects", "edges", "seen, times") if rows else ()
+        merged = f"; {len(self.merges)} merged into others" if self.merges else ""
+        slots = f"{', '.join(assumptions.alphabet.slots)} of {assumptions.alphabet.n_symbols} symbols"
+        note = f"actions {', '.join(assumptions.actions)}; slots {slots}{merged}{self._more_to_say()}"
+        return Table(title, headings, tuple(rows), note)
+
+    def _more_to_say(self) -> str:
+        """Return what else stands below the table."""
+        return ""
+
     def _repr_html_(self) -> str:
-        return memory_view(self)._repr_html_()
+        return self.table()._repr_html_()
 
     def __repr__(self) -> str:
         return f"RobotMemory({len(self)} of {self.assumptions.n_objects} objects)"
 
 
 _OBJECTS: Final = 12
-
-
-def memory_view(memory: RobotMemory, more: str = "") -> HtmlTable:
-    """Return a table of the remembered objects, with ``more`` to be said below it."""
-    assumptions = memory.assumptions
-    rows: list[tuple[Cell, ...]] = []
-    # The last ones are not looked at: a memory may hold very many.
-    for _, graph in zip(range(_OBJECTS), memory, strict=False):
-        aspects = Bar(graph.n_known / assumptions.n_aspects, f"{graph.n_known} of {assumptions.n_aspects}")
-        rows.append((graph.name, aspects, str(len(graph.counts)), str(sum(graph.counts.values()))))
-    if len(memory) > len(rows):
-        rows.append((f"… and {len(memory) - len(rows)} other objects", "", "", ""))
-    title = f"Robot memory: {len(memory)} of {assumptions.n_objects} objects"
-    headings = ("object", "known aspects", "edges", "seen, times") if rows else ()
-    merged = f"; {len(memory.merges)} merged into others" if memory.merges else ""
-    slots = f"{', '.join(assumptions.alphabet.slots)} of {assumptions.alphabet.n_symbols} symbols"
-    note = f"actions {', '.join(assumptions.actions)}; slots {slots}{merged}{more}"
-    return HtmlTable(title, headings, tuple(rows), note)

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Final, Literal, TypeAlias
+from typing import Any, Final, Literal, TypeAlias, get_args
 
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import Detection, FloatArray
-from atg_fg.core.table import Bar, Cell, HtmlTable, _symbols, shortened
+from atg_fg.core.table import Bar, Cell, Table, shortened, symbols_text
 
 #: How a trial can end.
 Verdict: TypeAlias = Literal["novel", "known", "lost", "undecided"]
+
+VERDICTS: Final[tuple[Verdict, ...]] = get_args(Verdict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,43 +101,25 @@ class TrialRecord:
         """Index of each action, in order."""
         return [step.action for step in self.steps if step.action is not None]
 
+    def table(self) -> Table:
+        """Return the trial look by look."""
+        rows = [_step_row(number, step, self) for number, step in enumerate(self.steps)]
+        ending = f"{self.verdict}{_of(self.matched)}" if rows else "nothing seen yet"
+        title = f"Trial of {len(self.actions)} actions: {ending}"
+        headings = (
+            "look",
+            f"seen ({', '.join(self.assumptions.alphabet.slots)})",
+            "most probable object",
+            "",
+            "unseen",
+        )
+        return Table(title, (*headings, "entropy, nats", "then"), shortened(rows, _LOOKS, "looks"))
+
     def _repr_html_(self) -> str:
-        return record_view(self)._repr_html_()
+        return self.table()._repr_html_()
 
     def __repr__(self) -> str:
-        return f"<{record_view(self).title}>"
-
-
-@dataclass(frozen=True)
-class TrialOutcome:
-    """What scoring and learning need of a trial.
-
-    Attributes:
-        verdict: How it ended.
-        matched: Name of the ATG the object was matched to.
-        patterns: Index of the pattern to learn from at each look, ``None`` where it was not complete.
-        actions: Index of each action.
-        object: What was presented, by the world's truth.
-        detections: The symbol seen in each slot at each look, ``None`` where nothing was.
-    """
-
-    verdict: Verdict
-    matched: str | None
-    patterns: tuple[int | None, ...]
-    actions: tuple[int, ...]
-    object: object
-    detections: tuple[Detection, ...]
-
-    @classmethod
-    def of(cls, record: TrialRecord, patterns: Sequence[int | None] | None = None) -> TrialOutcome:
-        """Return the outcome of a trial that has just been run, with ``patterns`` in place of those seen if given."""
-        truth = record.steps[0].truth["object"]
-        seen = record.patterns if patterns is None else patterns
-        detections = tuple(record.detections)
-        return cls(record.verdict, record.matched, tuple(seen), tuple(record.actions), truth, detections)
-
-    def _repr_html_(self) -> str:
-        return outcome_view(self)._repr_html_()
+        return f"<{self.table().title}>"
 
 
 @dataclass(frozen=True)
@@ -158,129 +142,134 @@ class Experiment:
 
 
 @dataclass(frozen=True)
-class StoredStep:
-    """One look of a stored trial, and the action chosen after it.
+class StepSummary:
+    """What is kept of one look, and of the action chosen after it.
 
     Attributes:
         observed: The symbol seen in each slot, ``None`` where nothing was.
-        pattern: Index of the pattern if the detection was complete.
+        pattern: Index of the pattern if the detection was complete; ``None``, too, where the record does not say.
         unseen: p(O unseen) given all up to here.
         entropy: Of identity, in nats.
-        log_evidence: ln p(z_0:t | a_1:t); ``None`` where it was not kept.
-        expected_entropy: Of each action by name, in nats, if the policy looked at them.
+        truth: What the world's ``info`` said.
         action: Name of the action chosen next; ``None`` at the end.
         purpose: What it is for, if the policy said so.
-        truth: What the world's ``info`` said.
+        log_evidence: ln p(z_0:t | a_1:t); ``None`` where it was not kept.
+        expected_entropy: Of each action by name, in nats, if the policy looked at them and it was kept.
     """
 
     observed: Detection
     pattern: int | None
     unseen: float
     entropy: float
-    log_evidence: float | None
-    expected_entropy: dict[str, float] | None
-    action: str | None
-    purpose: str | None
     truth: dict[str, Any]
+    action: str | None = None
+    purpose: str | None = None
+    log_evidence: float | None = None
+    expected_entropy: dict[str, float] | None = None
 
 
 @dataclass(frozen=True)
-class StoredTrial:
-    """A trial as a database has it.
+class TrialSummary:
+    """What is kept of a trial in logs, databases and runs: all that scoring, learning and reports need of it.
 
     Attributes:
-        experiment: Number of its experiment, ``None`` if it belongs to none.
-        number: Of the trial in its experiment, from 0.
         verdict: How it ended.
         matched: Name of the ATG that the object was matched to.
-        learned: Name of the ATG that it went to, ``None`` if nothing was learned in this memory.
-        learned_patterns: What was learned if that is not what was seen.
+        steps: The looks, at least one.
         lost_truth: What the world said when it lost the object.
-        steps: The looks.
+        learned: Name of the ATG that it went to, ``None`` if nothing was learned, or the record does not say.
+        learned_patterns: What was learned if that is not what was seen.
+        experiment: Number of its experiment in a database, ``None`` if it belongs to none.
+        number: Of the trial in its experiment, from 0.
     """
 
-    experiment: int | None
-    number: int
     verdict: Verdict
     matched: str | None
-    learned: str | None
-    learned_patterns: tuple[int | None, ...] | None
-    lost_truth: dict[str, Any] | None
-    steps: tuple[StoredStep, ...]
+    steps: tuple[StepSummary, ...]
+    lost_truth: dict[str, Any] | None = None
+    learned: str | None = None
+    learned_patterns: tuple[int | None, ...] | None = None
+    experiment: int | None = field(default=None, compare=False)
+    number: int = field(default=0, compare=False)
 
     @classmethod
     def of(
         cls, record: TrialRecord, learned: str | None = None, learned_patterns: Sequence[int | None] | None = None
-    ) -> StoredTrial:
-        """Return what is kept of a trial that was run; its number is given when it is written."""
+    ) -> TrialSummary:
+        """Return what is kept of a trial that was run.
+
+        Args:
+            record: Of the trial.
+            learned: Name of the ATG that it went to.
+            learned_patterns: Index of the pattern to learn from at each look; those seen if not given.
+        """
         names = record.assumptions.actions
         steps = [
-            StoredStep(
+            StepSummary(
                 step.detection,
                 step.pattern,
                 float(step.belief.unseen),
                 float(step.belief.entropy),
+                step.truth,
+                None if step.action is None else names[step.action],
+                step.purpose,
                 float(step.log_evidence),
                 None
                 if step.expected_entropies is None
                 else dict(zip(names, step.expected_entropies.tolist(), strict=True)),
-                None if step.action is None else names[step.action],
-                step.purpose,
-                step.truth,
             )
             for step in record.steps
         ]
         patterns = None if learned_patterns is None else tuple(learned_patterns)
-        return cls(None, 0, record.verdict, record.matched, learned, patterns, record.lost_truth, tuple(steps))
+        if patterns == tuple(record.patterns):
+            patterns = None
+        return cls(record.verdict, record.matched, tuple(steps), record.lost_truth, learned, patterns)
 
-    @classmethod
-    def of_line(cls, line: Mapping[str, Any], place: str) -> StoredTrial:
-        """Return what is kept of a trial in a log, which has a line for it.
+    @property
+    def patterns(self) -> tuple[int | None, ...]:
+        """Index of the pattern to learn from at each look, ``None`` where it was not complete."""
+        return self.learned_patterns or tuple(step.pattern for step in self.steps)
+
+    @property
+    def detections(self) -> tuple[Detection, ...]:
+        """The symbol seen in each slot at each look, ``None`` where nothing was."""
+        return tuple(step.observed for step in self.steps)
+
+    @property
+    def actions(self) -> tuple[str, ...]:
+        """Name of each action, in order."""
+        return tuple(step.action for step in self.steps if step.action is not None)
+
+    @property
+    def truths(self) -> tuple[dict[str, Any], ...]:
+        """What the world said at each look, and when it lost the object."""
+        truths = tuple(step.truth for step in self.steps)
+        return truths if self.lost_truth is None else (*truths, self.lost_truth)
+
+    @property
+    def object(self) -> int | str:
+        """What was presented, by the world's truth.
 
         Raises:
-            InvalidInputError: Not such a line; the message names ``place``.
+            InvalidInputError: The truth does not say.
         """
-        try:
-            looks, truths, actions = line["observed"], line["truth"], [*line["actions"], None]
-            purposes = line.get("purpose", [None] * len(looks))
-            steps = [
-                StoredStep(
-                    tuple(look), None, line["unseen"][t], line["entropy"][t], None, None, action, purposes[t], truths[t]
-                )
-                for t, (look, action) in enumerate(zip(looks, actions, strict=False))
-            ]
-            patterns = tuple(line["learned"]) if "learned" in line else None
-            lost = truths[-1] if line["verdict"] == "lost" else None
-            return cls(None, 0, line["verdict"], line["matched"], None, patterns, lost, tuple(steps))
-        except (KeyError, IndexError, TypeError, ValueError, AttributeError) as error:
-            raise InvalidInputError(f"{place}: {error!r}; expected a trial") from error
+        found: int | str | None = self.steps[0].truth.get("object")
+        if found is None:
+            raise InvalidInputError(f"truth: {self.steps[0].truth!r:.60}; expected the object that was presented")
+        return found
 
-    def line(self) -> dict[str, Any]:
-        """Return the trial as a log of trials has it (``trial_log.summary_of``)."""
-        truths, purposes = [step.truth for step in self.steps], [step.purpose for step in self.steps]
-        return {
-            "verdict": self.verdict,
-            "matched": self.matched,
-            "observed": [list(step.observed) for step in self.steps],
-            "actions": [step.action for step in self.steps if step.action is not None],
-            "unseen": [step.unseen for step in self.steps],
-            "entropy": [step.entropy for step in self.steps],
-            **({"purpose": purposes} if any(purposes) else {}),
-            "truth": truths if self.lost_truth is None else [*truths, self.lost_truth],
-            **({} if self.learned_patterns is None else {"learned": list(self.learned_patterns)}),
-        }
+    def table(self) -> Table:
+        """Return how the trial ended, what it was about, and what was seen."""
+        title = f"Trial of {len(self.actions)} actions: {self.verdict}{_of(self.matched)}"
+        seen = "; ".join(symbols_text(detection) for detection in self.detections[:_LOOKS])
+        presented = str(self.steps[0].truth.get("object", "–"))
+        return Table(title, ("object presented", "seen"), ((presented, seen),))
+
+    def _repr_html_(self) -> str:
+        return self.table()._repr_html_()
 
 
 _LOOKS: Final = 40
-
-
-def record_view(record: TrialRecord) -> HtmlTable:
-    """Return a table of a trial, look by look."""
-    rows = [_step_row(number, step, record) for number, step in enumerate(record.steps)]
-    ending = f"{record.verdict}{_of(record.matched)}" if rows else "nothing seen yet"
-    title = f"Trial of {len(record.actions)} actions: {ending}"
-    headings = ("look", f"seen ({', '.join(record.assumptions.alphabet.slots)})", "most probable object", "", "unseen")
-    return HtmlTable(title, (*headings, "entropy, nats", "then"), shortened(rows, _LOOKS, "looks"))
 
 
 def _step_row(number: int, step: TrialStep, record: TrialRecord) -> tuple[Cell, ...]:
@@ -291,20 +280,13 @@ def _step_row(number: int, step: TrialStep, record: TrialRecord) -> tuple[Cell, 
     then += [] if step.purpose is None else [f"({step.purpose})"]
     return (
         str(number),
-        _symbols(step.detection),
+        symbols_text(step.detection),
         name,
         Bar(share, f"{share:.3f}"),
         Bar(belief.unseen, f"{belief.unseen:.3f}"),
         f"{belief.entropy:.3f}",
         " ".join(then),
     )
-
-
-def outcome_view(outcome: TrialOutcome) -> HtmlTable:
-    """Return how a trial ended, what it was about, and what was seen."""
-    title = f"Trial of {len(outcome.actions)} actions: {outcome.verdict}{_of(outcome.matched)}"
-    seen = "; ".join(_symbols(detection) for detection in outcome.detections[:_LOOKS])
-    return HtmlTable(title, ("object presented", "seen"), ((str(outcome.object), seen),))
 
 
 def _of(matched: str | None) -> str:

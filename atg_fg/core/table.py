@@ -9,13 +9,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
-from typing import TYPE_CHECKING, Final, TypeAlias
+from typing import Final, TypeAlias
 
 from atg_fg.core.patterns import Detection
-
-if TYPE_CHECKING:
-    from collections.abc import Sequence
-
 
 _LINE: Final = "1px solid rgba(127, 127, 127, 0.35)"
 
@@ -43,7 +39,7 @@ Cell: TypeAlias = str | Bar
 
 
 @dataclass(frozen=True)
-class HtmlTable:
+class Table:
     """A table with a title above and a note below.
 
     Attributes:
@@ -93,8 +89,10 @@ def _cell(cell: Cell) -> str:
     )
 
 
-_ROWS: Final = 40
+#: Rows that are shown of a long table of results.
+ROWS: Final = 40
 
 
-def _symbols(pattern: Detection | Sequence[int]) -> str:
+def symbols_text(pattern: Detection | Sequence[int]) -> str:
+    """Return the symbols of a pattern, or of what was seen of it, in brackets."""
     return f"({', '.join('–' if symbol is None else str(symbol) for symbol in pattern)})"

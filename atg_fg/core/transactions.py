@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager, contextmanager
 from functools import wraps
 from typing import Any, Concatenate, ParamSpec, Protocol, Self, TypeVar
 
-from atg_fg.core.records import Experiment, StoredTrial, TrialRecord
+from atg_fg.core.records import Experiment, TrialRecord, TrialSummary
 
 _Arguments = ParamSpec("_Arguments")
 
@@ -36,7 +36,7 @@ class Keeper(Protocol):
     def experiments(self) -> Iterator[Experiment]:
         """Yield the experiments in the file."""
 
-    def trials(self, experiment: int | None) -> Iterator[StoredTrial]:
+    def trials(self, experiment: int | None) -> Iterator[TrialSummary]:
         """Yield the trials in the file."""
 
     def close(self) -> None:
@@ -104,7 +104,7 @@ class Persistent:
         """Yield the experiments in the file, in their order; none if there is no file."""
         return iter(()) if self._keeper is None else self._keeper.experiments()
 
-    def trials(self, experiment: int | None = None) -> Iterator[StoredTrial]:
+    def trials(self, experiment: int | None = None) -> Iterator[TrialSummary]:
         """Yield the records of trials in the file, in their order, a few in RAM at a time; none if there is no file.
 
         Args:

@@ -9,10 +9,11 @@ from typing import Any
 
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.statistics import mean, standard_error
-from atg_fg.core.table import Bar, Cell, HtmlTable
+from atg_fg.core.table import Bar, Cell, Table
+from atg_fg.experiments.plans import unusual
 from atg_fg.experiments.result_log import ResultLog, run_logged
 from atg_fg.experiments.scores import pooled_interval
-from atg_fg.experiments.table1 import TestPlan, unusual
+from atg_fg.experiments.table1 import TestPlan
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,7 @@ def figure3_points(
     return summaries
 
 
-def table_of_points(points: Sequence[Mapping[str, Any]], title: str = "") -> HtmlTable:
+def table_of_points(points: Sequence[Mapping[str, Any]], title: str = "") -> Table:
     """Return the points of Figure 3, a row for each number of actions, a column for each policy.
 
     Raises:
@@ -108,7 +109,7 @@ def table_of_points(points: Sequence[Mapping[str, Any]], title: str = "") -> Htm
     for actions in dict.fromkeys(point["actions"] for point in points):
         found = [by_place.get((actions, policy)) for policy in policies]
         rows.append((str(actions), *("" if point is None else _point(point) for point in found)))
-    return HtmlTable(title or "Success by actions", ("actions", *policies), tuple(rows), "success; 95 % intervals")
+    return Table(title or "Success by actions", ("actions", *policies), tuple(rows), "success; 95 % intervals")
 
 
 def _point(point: Mapping[str, Any]) -> Bar:

@@ -13,7 +13,7 @@ from atg_fg.core.goals import Goal
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.records import TrialRecord
 from atg_fg.core.statistics import mean, wilson_interval
-from atg_fg.core.table import _ROWS, Cell, HtmlTable, shortened
+from atg_fg.core.table import ROWS, Cell, Table, shortened
 from atg_fg.inference.known_transitions import transitions_of_graph
 from atg_fg.policies.shortest_paths import nearest_aspect, shortest_path
 from atg_fg.worlds.arcube import ORIENTATIONS, SUCCESSORS, Cube, shown_pattern
@@ -178,7 +178,7 @@ def _rate(count: int, total: int) -> dict[str, Any]:
     }
 
 
-def table_of_goals(served: Sequence[ServedObject], title: str = "") -> HtmlTable:
+def table_of_goals(served: Sequence[ServedObject], title: str = "") -> Table:
     """Return what came of each goal."""
     rows: list[tuple[Cell, ...]] = [
         (
@@ -195,9 +195,9 @@ def table_of_goals(served: Sequence[ServedObject], title: str = "") -> HtmlTable
     low, high = wilson_interval(reached, len(served))
     note = f"reached {reached} of {len(served)} ({100 * low:.1f}–{100 * high:.1f} %, 95 % Wilson interval)"
     headings = ("object", "goal", "ending", "taken for", "actions to recognise", "actions to the goal")
-    return HtmlTable(
+    return Table(
         title or f"{len(served)} {'goal' if len(served) == 1 else 'goals'}",
         headings,
-        shortened(rows, _ROWS, "goals"),
+        shortened(rows, ROWS, "goals"),
         note,
     )

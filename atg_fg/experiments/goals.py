@@ -15,21 +15,24 @@ import numpy as np
 
 from atg_fg.core.assumptions import arcube_assumptions
 from atg_fg.core.belief import IdentityBelief
+from atg_fg.core.checks import whole_number
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.goals import Goal
 from atg_fg.core.parameters import ModelParameters
-from atg_fg.core.records import TrialRecord
+from atg_fg.core.records import TrialRecord, TrialSummary
 from atg_fg.engines import begin_trial, check_engine
 from atg_fg.experiments.executors.base import run_pieces
 from atg_fg.experiments.exploration import complete_memory, learned_memory
 from atg_fg.experiments.goal_scores import ServedObject, score, table_of_goals
+from atg_fg.experiments.plans import unusual
 from atg_fg.experiments.trial import run_trial
 from atg_fg.inference.all_different import identity_given_others
 from atg_fg.policies import POLICIES, GoalPolicy, make_policy
 from atg_fg.policies.goal import ENTROPY_THRESHOLD, PLANNERS, UNREACHABLE
 from atg_fg.storage.checked_json import parse_json, plain_json
+from atg_fg.storage.growing_file import check_not_begun
 from atg_fg.storage.plain_files import make_folder, read_gzipped_text, write_bytes_atomically
-from atg_fg.storage.trial_log import check_not_begun, summary_of
+from atg_fg.storage.trial_log import to_line
 from atg_fg.worlds.arcube import ORIENTATIONS, make_arcubes, shown_pattern
 from atg_fg.worlds.base import World
 from atg_fg.worlds.registry import check_arcube_world
@@ -77,8 +80,7 @@ class GoalPlan:
 
     def __post_init__(self) -> None:
         for name in ("n_stations", "n_remembered", "n_objects", "n_actions"):
-            if getattr(self, name) < 1:
-                raise InvalidInputError(f"{name}: {getattr(self, name)}; expected a whole number of at least 1")
+            whole_number(getattr(self, name), name, least=1)
         if self.learning_actions < 0:
             raise InvalidInputError(f"learning_actions: {self.learning_actions}; expected 0 (complete ATGs) or more")
         for name, larger in (("n_stations", "n_remembered"), ("n_remembered", "n_objects")):
@@ -189,8 +191,7 @@ def run_many(
     Raises:
         InvalidInputError: The records are there already, or of another experiment.
     """
-    if n_runs < 1:
-        raise InvalidInputError(f"runs: {n_runs}; expected a whole number of at least 1")
+    whole_number(n_runs, "runs", least=1)
     if records is not None:
         records = make_folder(records).resolve()
         for number in range(n_runs) if not resume else ():
@@ -216,10 +217,7 @@ def _run_and_save(plan: GoalPlan, seed: int, records: Path | None, number: int) 
     """Run once; a run that is saved already, perhaps by a worker that died right after, is only read."""
     if records is None:
         return run_goals(plan, run_seed(seed, number)).served
-    # What is as usual is left out, so that a plan may get more to say and old records still be gone on with.
-    usual = asdict(GoalPlan())
-    unusual = {name: value for name, value in asdict(plan).items() if value != usual[name]}
-    file = GoalRunFile(_run_path(records, number), {"seed": seed, "run": number, **unusual})
+    file = GoalRunFile(_run_path(records, number), {"seed": seed, "run": number, **unusual(plan)})
     if file.path.exists():
         return file.read()
     run = run_goals(plan, run_seed(seed, number))
@@ -244,7 +242,10 @@ class GoalRunFile:
 
     def write(self, served: Sequence[ServedObject], records: Sequence[TrialRecord]) -> None:
         """Save what came of each goal, with what was seen and done."""
-        entries = [{**asdict(each), "trial": summary_of(record)} for each, record in zip(served, records, strict=True)]
+        entries = [
+            {**asdict(each), "trial": to_line(TrialSummary.of(record))}
+            for each, record in zip(served, records, strict=True)
+        ]
         document = {**self._header, "served": entries}
         text = json.dumps(document, default=plain_json, allow_nan=False, separators=(",", ":"))
         write_bytes_atomically(self.path, gzip.compress(text.encode(), mtime=0))
@@ -263,6 +264,8 @@ class GoalRunFile:
             raise InvalidInputError(
                 f"{self.path}: cannot be read: {error!r}; expected a run that --records wrote"
             ) from error
+        if document.get("parameters", {}).get("learn_structure") is False:  # as older versions wrote it
+            del document["parameters"]["learn_structure"]
         if document != self._header:
             raise InvalidInputError(
                 f"{self.path}: holds {json.dumps(document)}; expected the run of {json.dumps(self._header)}"

@@ -17,7 +17,7 @@ from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence
-from atg_fg.core.records import TrialOutcome, TrialRecord, TrialStep
+from atg_fg.core.records import TrialRecord, TrialStep, TrialSummary
 from atg_fg.engines import begin_trial, check_engine
 from atg_fg.experiments.scores import Score
 from atg_fg.experiments.trial import check_world, learn_from
@@ -174,7 +174,7 @@ class RecognitionEnv(gymnasium.Env[Summary, np.int64]):
         """Score the trial, let the memory learn from it, and return the last step of the episode."""
         learned = learn_from(self._record, self.memory) if self.learns else None
         before = self._score.successes
-        self._score.add(TrialOutcome.of(self._record), learned)
+        self._score.add(TrialSummary.of(self._record), learned)
         success = self._score.successes > before
         self._inference = None
         info = {**self._truth, "record": self._record, "success": success}

@@ -2,65 +2,55 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
-from typing import Any
-
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence
-from atg_fg.core.records import TrialOutcome, TrialRecord, TrialStep
+from atg_fg.core.records import TrialRecord, TrialStep, TrialSummary
 from atg_fg.engines import begin_trial
 from atg_fg.experiments.scores import Score, TestResult
 from atg_fg.experiments.trial import learn_from
 from atg_fg.learning.structured_memory import memory_for
-from atg_fg.storage.trial_log import read_trials
+from atg_fg.storage.recorded_test import RecordedTest
 
 
-def rescore(path: Path, assumptions: Assumptions, engine: str, parameters: ModelParameters) -> TestResult:
+def rescore(test: RecordedTest, engine: str, parameters: ModelParameters) -> TestResult:
     """Return the scores that a model gets on the evidence of a recorded test, learning from an empty memory as it goes.
 
     The actions are those of the record: they suited the model that chose them. A trial in which the object was lost
     stays lost.
 
     Args:
-        path: What ``table1 --records`` wrote, ``….jsonl.gz``.
-        assumptions: Under which the trials were made.
+        test: What ``recorded_tests`` returns.
         engine: Name of the inference engine.
         parameters: Of the model.
 
     Raises:
-        InvalidInputError: The file cannot be read, or its trials do not fit the assumptions.
+        InvalidInputError: The test has no trials.
     """
-    memory = memory_for(parameters, RobotMemory(assumptions))
+    if not test.trials:
+        raise InvalidInputError(f"{test.place}: no trials; expected at least one")
+    memory = memory_for(parameters, RobotMemory(test.assumptions))
     score = Score()
-    for number, line in enumerate(read_trials(path)):
-        try:
-            record = _judged(line, memory, engine, parameters)
-        except (KeyError, IndexError, TypeError, ValueError) as error:
-            raise InvalidInputError(f"{path}: trial {number}: {error}; expected looks and actions of cubes") from error
-        outcome = TrialOutcome.of(record)
-        score.add(outcome, learn_from(outcome, memory))
+    for recorded in test.trials:
+        trial = TrialSummary.of(_judged(recorded, memory, test.assumptions, engine, parameters))
+        score.add(trial, learn_from(trial, memory))
     return score.result(0)
 
 
-def _judged(line: Mapping[str, Any], memory: RobotMemory, engine: str, parameters: ModelParameters) -> TrialRecord:
+def _judged(
+    trial: TrialSummary, memory: RobotMemory, assumptions: Assumptions, engine: str, parameters: ModelParameters
+) -> TrialRecord:
     """Return a recorded trial with the beliefs of this model."""
-    assumptions = memory.assumptions
-    actions = [assumptions.actions.index(action) for action in line["actions"]]
     inference = begin_trial(engine, memory, parameters)
-    record = TrialRecord(memory.names, assumptions)
-    for time, detection in enumerate(line["observed"]):
-        evidence = Evidence.of_detection(assumptions.alphabet, detection)
+    record = TrialRecord(memory.names, assumptions, lost_truth=trial.lost_truth)
+    for look in trial.steps:
+        evidence = Evidence.of_detection(assumptions.alphabet, look.observed)
         inference.observe(evidence)
-        action = actions[time] if time < len(actions) else None
-        belief, truth = inference.identity(), line["truth"][time]
-        seen = tuple(detection)
-        record.steps.append(TrialStep(seen, evidence.pattern, belief, inference.log_evidence, truth, None, action))
+        action = None if look.action is None else assumptions.action_index(look.action)
+        belief, evidenced = inference.identity(), inference.log_evidence
+        record.steps.append(TrialStep(look.observed, evidence.pattern, belief, evidenced, look.truth, None, action))
         if action is not None:
             inference.act(action)
-    if line["verdict"] == "lost":
-        record.lost_truth = line["truth"][-1]
     return record

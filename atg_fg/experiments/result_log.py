@@ -2,20 +2,23 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, fields
+from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar, get_type_hints
 
+from atg_fg.core.checks import brief, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.experiments.scores import TestResult
 from atg_fg.experiments.table1 import TestPlan, run_tests
-from atg_fg.storage.plain_files import append_bytes, read_bytes_file, write_bytes_atomically
+from atg_fg.storage.checked_json import read_list, read_object
+from atg_fg.storage.growing_file import GrowingFile
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
+
+_SCORES: Final = ("identification", "recognition", "success")
 
 Cell = TypeVar("Cell", bound="DataclassInstance")
 
@@ -34,15 +37,11 @@ class ResultLog(Generic[Cell]):
     """
 
     def __init__(self, path: Path, experiment: str, header: Mapping[str, Any], cell_type: type[Cell]) -> None:
-        self.path = path
-        self._experiment = experiment
-        self._header = json.loads(json.dumps(header))
+        self._file = GrowingFile(path, header, f"the log of {experiment}")
         self._cell_type = cell_type
         self._results: dict[tuple[Cell, int], TestResult] = {}
-        if path.exists():
-            self._read()
-        else:
-            write_bytes_atomically(path, _line(self._header))
+        for number, line in enumerate(self._file.resume(), 2):
+            self._take(line, f"{path}: line {number}")
 
     def get(self, cell: Cell, seed: int) -> TestResult | None:
         """Return the result of a test, ``None`` if it was not run yet."""
@@ -55,36 +54,27 @@ class ResultLog(Generic[Cell]):
             InvalidInputError: The disk is full, or the file cannot be written for another reason.
         """
         self._results[cell, result.seed] = result
-        scores = {name: getattr(result, name) for name in ("identification", "recognition", "success")}
-        append_bytes(self.path, _line({**asdict(cell), "seed": result.seed, **scores}))
+        scores = {name: getattr(result, name) for name in _SCORES}
+        self._file.append({**asdict(cell), "seed": result.seed, **scores})
 
-    def _read(self) -> None:
-        try:
-            content = read_bytes_file(self.path)
-            sound = content[: content.rfind(b"\n") + 1]  # a writer that was cut off leaves at most half a line
-            header, *lines = [json.loads(line) for line in sound.split(b"\n")[:-1]]
-            if header != self._header:
-                raise ValueError(f"holds {json.dumps(header)}, not {json.dumps(self._header)}")
-            for line in lines:
-                self._take(line)
-        except (ValueError, KeyError, TypeError, IndexError, RecursionError) as error:
-            raise InvalidInputError(
-                f"{self.path}: {error}; expected the log of {self._experiment} with such tests"
-            ) from error
-        if len(sound) < len(content):
-            write_bytes_atomically(self.path, sound)
-
-    def _take(self, line: dict[str, Any]) -> None:
-        cell = self._cell_type(**{field.name: line[field.name] for field in fields(self._cell_type)})
-        identification, recognition, success = (
-            (int(line[name][0]), int(line[name][1])) for name in ("identification", "recognition", "success")
-        )
-        result = TestResult(int(line["seed"]), identification, recognition, success)
-        self._results[cell, result.seed] = result
+    def _take(self, line: Any, place: str) -> None:
+        types = get_type_hints(self._cell_type)
+        entry = read_object(line, place, (*types, "seed", *_SCORES))
+        for name, kind in types.items():
+            if type(entry[name]) is not kind:
+                raise InvalidInputError(f"{place}: {name}: {brief(entry[name])}; expected a {kind.__name__}")
+        seed = whole_number(entry["seed"], f"{place}: seed")
+        identification, recognition, success = (_count(entry[name], f"{place}: {name}") for name in _SCORES)
+        cell = self._cell_type(**{name: entry[name] for name in types})
+        self._results[cell, seed] = TestResult(seed, identification, recognition, success)
 
 
-def _line(entry: dict[str, Any]) -> bytes:
-    return (json.dumps(entry) + "\n").encode()
+def _count(value: Any, place: str) -> tuple[int, int]:
+    """Return a count, and what it is a count of."""
+    if len(read_list(value, place)) != 2:
+        raise InvalidInputError(f"{place}: {brief(value)}; expected a count, and what it is of")
+    of = whole_number(value[1], place)
+    return whole_number(value[0], place, 0, of), of
 
 
 def run_logged(

@@ -6,13 +6,13 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.core.table import HtmlTable
+from atg_fg.core.table import Table
 from atg_fg.experiments.figure3 import table_of_points
 from atg_fg.experiments.goal_scores import table_of_goals
 from atg_fg.experiments.scores import _comparison, table_of_tests
 
 
-def results_table(results: Any, title: str = "") -> HtmlTable:
+def results_table(results: Any, title: str = "") -> Table:
     """Return a table of results, which a notebook shows and ``print`` prints.
 
     Args:

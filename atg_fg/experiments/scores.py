@@ -6,9 +6,9 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
-from atg_fg.core.records import TrialOutcome
+from atg_fg.core.records import TrialSummary
 from atg_fg.core.statistics import mean, mean_interval, standard_error, wilson_interval
-from atg_fg.core.table import _ROWS, Bar, Cell, HtmlTable, shortened
+from atg_fg.core.table import ROWS, Bar, Cell, Table, shortened
 from atg_fg.learning.duplicates import Duplicate
 
 
@@ -58,25 +58,25 @@ class Score:
         self._made_from: dict[str, object] = dict(made_from or {})
         self._presented: set[object] = set(self._made_from.values())
 
-    def add(self, outcome: TrialOutcome, learned: str | None) -> None:
+    def add(self, trial: TrialSummary, learned: str | None) -> None:
         """Score a trial whose record went to the ATG named ``learned``.
 
         A trial without a verdict is no success, but its object was met.
         """
         self.n_trials += 1
-        self.lost += outcome.verdict == "lost"
-        self.undecided += outcome.verdict == "undecided"
-        self._actions.append(len(outcome.actions))
-        seen_before = outcome.object in self._presented
-        identified = outcome.verdict == ("known" if seen_before else "novel")
-        right_match = outcome.matched is not None and self._made_from.get(outcome.matched) == outcome.object
+        self.lost += trial.verdict == "lost"
+        self.undecided += trial.verdict == "undecided"
+        self._actions.append(len(trial.actions))
+        seen_before = trial.object in self._presented
+        identified = trial.verdict == ("known" if seen_before else "novel")
+        right_match = trial.matched is not None and self._made_from.get(trial.matched) == trial.object
         self.identified += identified
         self.judged_known += seen_before and identified
         self.recognised += seen_before and identified and right_match
         self.successes += identified and (right_match or not seen_before)
-        self._presented.add(outcome.object)
-        if learned is not None and outcome.verdict == "novel":
-            self._made_from[learned] = outcome.object
+        self._presented.add(trial.object)
+        if learned is not None and trial.verdict == "novel":
+            self._made_from[learned] = trial.object
 
     def has_met(self, presented: object) -> bool:
         """Whether an object was presented in a trial before."""
@@ -158,27 +158,27 @@ def pooled_interval(tests: Sequence[TestResult], score: str) -> tuple[float, flo
 _SCORES: Final = ("identification", "recognition", "success")
 
 
-def table_of_tests(tests: Sequence[TestResult], title: str = "") -> HtmlTable:
+def table_of_tests(tests: Sequence[TestResult], title: str = "") -> Table:
     """Return tests as the paper's Table 1 has them, with the average over tests and intervals over all trials."""
     rows: list[tuple[Cell, ...]] = [
         (str(test.seed), *(_count(getattr(test, score)) for score in _SCORES)) for test in tests
     ]
-    rows = list(shortened(rows, _ROWS, "tests"))
+    rows = list(shortened(rows, ROWS, "tests"))
     if len(tests) > 1:
         rows.append(("average", *(_average(tests, score) for score in _SCORES)))
     rows.append(("95 % interval", *(_interval(tests, score) for score in _SCORES)))
     endings = [f"{number} {name}" for name in ("lost", "undecided") if (number := sum(getattr(t, name) for t in tests))]
     noun = "test" if len(tests) == 1 else "tests"
-    return HtmlTable(title or f"{len(tests)} {noun}", ("seed", *_SCORES), tuple(rows), ", ".join(endings))
+    return Table(title or f"{len(tests)} {noun}", ("seed", *_SCORES), tuple(rows), ", ".join(endings))
 
 
-def _comparison(compared: Mapping[str, Sequence[TestResult]], title: str) -> HtmlTable:
+def _comparison(compared: Mapping[str, Sequence[TestResult]], title: str) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for name, tests in compared.items():
         cells = [Bar(_average(tests, score).share, _with_interval(tests, score)) for score in _SCORES]
         rows.append((name, str(len(tests)), *cells))
     note = "averages over tests; 95 % Wilson intervals over all trials"
-    return HtmlTable(title or "Tests compared", ("", "tests", *_SCORES), tuple(rows), note)
+    return Table(title or "Tests compared", ("", "tests", *_SCORES), tuple(rows), note)
 
 
 def _count(count: tuple[int, int]) -> Bar:

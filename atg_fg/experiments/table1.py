@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from atg_fg.core.checks import whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
-from atg_fg.core.records import TrialOutcome, TrialRecord
+from atg_fg.core.records import TrialRecord, TrialSummary
 from atg_fg.engines import begin_trial, check_engine
 from atg_fg.experiments.executors.base import run_pieces, stop_if_asked
+from atg_fg.experiments.plans import unusual
 from atg_fg.experiments.scores import Score, TestResult
 from atg_fg.experiments.trial import learn_from, run_trial
 from atg_fg.inference.interface import Inference
@@ -25,9 +27,10 @@ from atg_fg.learning.duplicates import merge_duplicates
 from atg_fg.learning.structured_memory import memory_for
 from atg_fg.policies import Policy, make_policy
 from atg_fg.storage.database.trial_log import DatabaseTrialLog, check_not_in_database
+from atg_fg.storage.growing_file import check_not_begun
 from atg_fg.storage.memory_files import goes_to_database, save_memory
 from atg_fg.storage.plain_files import make_folder
-from atg_fg.storage.trial_log import TrialLog, check_not_begun
+from atg_fg.storage.trial_log import TrialLog
 from atg_fg.worlds.base import World
 from atg_fg.worlds.registry import assumptions_of, make_world_with
 
@@ -67,8 +70,7 @@ class TestPlan:
 
     def __post_init__(self) -> None:
         for name in ("n_actions", "n_trials", "n_objects"):
-            if getattr(self, name) < 1:
-                raise InvalidInputError(f"{name}: {getattr(self, name)}; expected a whole number of at least 1")
+            whole_number(getattr(self, name), name, least=1)
         check_engine(self.engine, self.parameters)
         make_policy(self.policy, self.settled)
 
@@ -112,17 +114,17 @@ def run_test(
         memory = memory_for(plan.parameters, RobotMemory(assumptions_of(world, plan.n_objects)))
         log = _open_log(plan, seed, records, memory)
         if log is not None:
-            for outcome in log.resume() if resume else log.begin():
-                _learn_and_score(outcome, memory, plan, score)
+            for trial in log.resume() if resume else log.begin():
+                _learn_and_score(trial, memory, plan, score)
         for number in range(score.n_trials, plan.n_trials):
             inference = begin_trial(plan.engine, memory, plan.parameters)
             rng = np.random.default_rng(trial_seeds[number])
             record = run_trial(world, inference, policy, plan.n_actions, rng)
             smoothed = _smoothed(inference, record) if plan.smoothed_learning else None
-            outcome = TrialOutcome.of(record, smoothed)
-            _learn_and_score(outcome, memory, plan, score)
+            trial = TrialSummary.of(record, learned_patterns=smoothed)
+            _learn_and_score(trial, memory, plan, score)
             if log is not None:
-                log.append(record, outcome)
+                log.append(trial)
             if on_trial is not None:
                 on_trial(number, record)
             stop_if_asked()
@@ -132,9 +134,9 @@ def run_test(
     return score.result(seed, merging=plan.merge_duplicates)
 
 
-def _learn_and_score(outcome: TrialOutcome, memory: RobotMemory, plan: TestPlan, score: Score) -> None:
-    learned = learn_from(outcome, memory)
-    score.add(outcome, learned)
+def _learn_and_score(trial: TrialSummary, memory: RobotMemory, plan: TestPlan, score: Score) -> None:
+    learned = learn_from(trial, memory)
+    score.add(trial, learned)
     if plan.merge_duplicates and learned is not None:
         score.add_merges(merge_duplicates(memory, plan.parameters, learned))
 
@@ -163,19 +165,6 @@ def _header(plan: TestPlan, seed: int) -> dict[str, Any]:
 
 def _log_path(records: Path, seed: int) -> Path:
     return records / f"test-{seed:04}.jsonl.gz"
-
-
-def unusual(plan: TestPlan) -> dict[str, Any]:
-    """Return what a plan has other than usual: a plan may get more to say, and old records still be gone on with."""
-    usual = _described(TestPlan())
-    return {name: value for name, value in _described(plan).items() if value != usual[name]}
-
-
-def _described(plan: TestPlan) -> dict[str, Any]:
-    description = asdict(plan)
-    if not plan.parameters.learn_structure:
-        del description["parameters"]["learn_structure"]
-    return description
 
 
 def _smoothed(inference: Inference, record: TrialRecord) -> list[int | None] | None:

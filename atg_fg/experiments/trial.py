@@ -11,7 +11,7 @@ from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.patterns import Evidence
-from atg_fg.core.records import TrialOutcome, TrialRecord, TrialStep
+from atg_fg.core.records import TrialRecord, TrialStep, TrialSummary
 from atg_fg.inference.interface import Inference
 from atg_fg.policies import Policy
 from atg_fg.worlds.base import World, detection_of
@@ -99,16 +99,18 @@ def run_trial(
         remaining = 0 if terminated or truncated else remaining - 1
 
 
-def learn_from(record: TrialRecord | TrialOutcome, memory: RobotMemory) -> str | None:
+def learn_from(record: TrialRecord | TrialSummary, memory: RobotMemory) -> str | None:
     """Let the memory learn from a trial, in one transaction if it is kept in a file; return the name of the ATG.
 
     Nothing is learned, and ``None`` returned, if the object was lost or no pattern was seen whole.
     """
+    trial = TrialSummary.of(record) if isinstance(record, TrialRecord) else record
     with memory.transaction():
         name = None
-        if record.verdict not in ("lost", "undecided") and any(pattern is not None for pattern in record.patterns):
-            name = memory.learn(list(record.patterns), list(record.actions), record.matched)
-            memory.learn_shared(name, record.detections, record.actions)
+        if trial.verdict not in ("lost", "undecided") and any(pattern is not None for pattern in trial.patterns):
+            actions = [memory.assumptions.action_index(action) for action in trial.actions[: len(trial.steps) - 1]]
+            name = memory.learn(list(trial.patterns), actions, trial.matched)
+            memory.learn_shared(name, trial.detections, actions)
         if isinstance(record, TrialRecord):
             memory.add_record(record, name)
     return name

@@ -8,11 +8,10 @@ from collections.abc import Iterable, Sequence
 from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.core.memory import RobotMemory, memory_view
+from atg_fg.core.memory import RobotMemory
 from atg_fg.core.merging import Merge
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Detection
-from atg_fg.core.table import HtmlTable
 from atg_fg.core.transactions import one_transaction
 from atg_fg.learning.learner import StructureLearner
 from atg_fg.learning.raw_trials import RawTrial
@@ -95,8 +94,10 @@ class StructuredMemory(RobotMemory):
 
     __hash__ = None
 
-    def _repr_html_(self) -> str:
-        return structured_memory_view(self)._repr_html_()
+    def _more_to_say(self) -> str:
+        believed = self.learner.believed(self.names)
+        weights = f"with weights {', '.join(f'{each.weight:.2f}' for each in believed)}" if believed else "none"
+        return f"; {len(self.learner.trials)} raw trials; structures believed in: {weights}"
 
     def __repr__(self) -> str:
         return (
@@ -114,10 +115,3 @@ def memory_for(parameters: ModelParameters, memory: RobotMemory) -> RobotMemory:
         structured._keeper, memory._keeper = memory._keeper, None
         return structured
     return memory
-
-
-def structured_memory_view(memory: StructuredMemory) -> HtmlTable:
-    """Return the table of a memory that also learns what its objects share."""
-    believed = memory.learner.believed(memory.names)
-    weights = f"with weights {', '.join(f'{each.weight:.2f}' for each in believed)}" if believed else "none"
-    return memory_view(memory, f"; {len(memory.learner.trials)} raw trials; structures believed in: {weights}")

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
 from atg_fg.core.assumptions import Assumptions, arcube_assumptions
+from atg_fg.core.checks import one_of
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
-from atg_fg.report import checked
 from atg_fg.report.content import Report, TrialPage, shown_parameters
-from atg_fg.report.summaries import read_looks, verdict_of, with_graphs
-from atg_fg.storage.checked_json import check_format, parse_json, read_list
+from atg_fg.report.summaries import looks_of, told_truth, told_verdict, with_graphs
+from atg_fg.storage.checked_json import check_format, parse_json, read_info, read_list, read_object
 from atg_fg.storage.plain_files import read_gzipped_text
+from atg_fg.storage.trial_log import from_line
 
 GOAL_RUN_FORMAT: Final = "atg-fg/goal-run"
 _ENDINGS: Final = {
@@ -41,17 +41,17 @@ def read_goal_run(path: Path, memory: RobotMemory | None) -> Report:
     """
     text = read_gzipped_text(path, "expected a run that --records wrote")
     document = parse_json(text, str(path))
-    for key in ("format", "version"):
-        checked.field_of(document, key, str(path))
-    check_format(document, GOAL_RUN_FORMAT, str(path))
-    served = read_list(checked.field_of(document, "served", str(path)), f"{path}: served")
+    header = read_object(document, str(path), ("format", "version", "served"), optional=tuple(document))
+    check_format(header, GOAL_RUN_FORMAT, str(path))
+    served = read_list(document.pop("served"), f"{path}: served")
+    read_info(document, str(path))
     if not served:
         raise InvalidInputError(f"{path}: served: no goals; expected at least one")
     assumptions = arcube_assumptions() if memory is None else memory.assumptions
     pages = [
         _page(entry, number, memory, assumptions, f"{path}: served[{number}]") for number, entry in enumerate(served)
     ]
-    header = {key: value for key, value in document.items() if key not in ("format", "version", "served")}
+    header = {key: value for key, value in document.items() if key not in ("format", "version")}
     reached = sum(entry["ending"] == "reached" for entry in served)
     title = f"Run {header.get('run', '')}: {reached} of {len(served)} goals reached"
     notes = () if memory is not None else (_NO_BELIEFS,)
@@ -60,23 +60,20 @@ def read_goal_run(path: Path, memory: RobotMemory | None) -> Report:
 
 def _page(entry: Any, number: int, memory: RobotMemory | None, assumptions: Assumptions, place: str) -> TrialPage:
     """Return what came of one goal."""
-    ending = checked.field_of(entry, "ending", place)
-    if ending not in _ENDINGS:
-        raise InvalidInputError(f"{place}: ending: {json.dumps(ending)}; expected one of: {', '.join(_ENDINGS)}")
-    goal = checked.detection(checked.field_of(entry, "goal", place), assumptions, f"{place}: goal")
-    summary = checked.field_of(entry, "trial", place)
-    looks = read_looks(summary, assumptions, f"{place}: trial")
-    verdict, matched = verdict_of(summary, f"{place}: trial")
+    read_object(entry, place, ("ending", "goal", "trial"), optional=tuple(entry) if isinstance(entry, dict) else ())
+    ending = one_of(entry["ending"], f"{place}: ending", _ENDINGS)
+    goal = assumptions.alphabet.check_detection(read_list(entry["goal"], f"{place}: goal"), f"{place}: goal")
+    trial = from_line(entry["trial"], f"{place}: trial", assumptions)
     page = TrialPage(
         title=f"station {number}",
-        verdict=f"{verdict}; {_ENDINGS[ending]}",
-        truth=f"{checked.told_truth(summary['truth'][0])}, goal {'shown' if entry.get('shown') else 'not shown'}",
-        right=_is_right(entry, str(ending)),
+        verdict=f"{told_verdict(trial.verdict, trial.matched)}; {_ENDINGS[ending]}",
+        truth=f"{told_truth(trial.truths[0])}, goal {'shown' if entry.get('shown') else 'not shown'}",
+        right=_is_right(entry, ending),
         looks=(),
         graphs=(),
         goal=goal,
     )
-    return with_graphs(page, looks, memory, assumptions, matched)
+    return with_graphs(page, looks_of(trial), memory, assumptions, trial.matched)
 
 
 def _is_right(entry: Mapping[str, Any], ending: str) -> bool:

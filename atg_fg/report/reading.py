@@ -13,11 +13,12 @@ from atg_fg.report.content import Report
 from atg_fg.report.database import read_database
 from atg_fg.report.experiments import EXPERIMENTS, read_experiment
 from atg_fg.report.goal_run import GOAL_RUN_FORMAT, read_goal_run
-from atg_fg.report.test_log import read_test_log
+from atg_fg.report.test_log import test_report
 from atg_fg.report.trial_record import read_trial_record
 from atg_fg.storage.checked_json import parse_json
 from atg_fg.storage.database.connection import is_database
 from atg_fg.storage.plain_files import read_text_file, readable_again
+from atg_fg.storage.recorded_test import recorded_tests
 from atg_fg.storage.trial_record import TRIAL_FORMAT
 
 _GZIP: Final = b"\x1f\x8b"
@@ -53,7 +54,10 @@ def _report_of(path: Path, memory: RobotMemory | None) -> Report:
     if is_database(path):
         return read_database(path, memory)
     if start.startswith(_GZIP):
-        return read_goal_run(path, memory) if _is_goal_run(start) else read_test_log(path, memory)
+        if _is_goal_run(start):
+            return read_goal_run(path, memory)
+        (test,) = recorded_tests(path, None if memory is None else memory.assumptions)
+        return test_report(test)
     text = read_text_file(path)
     if _first_line(text).get("format") == TRIAL_FORMAT:
         return read_trial_record(text, path, memory)

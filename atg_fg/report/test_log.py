@@ -7,28 +7,22 @@ recorded of it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from contextlib import closing
 from dataclasses import replace
-from pathlib import Path
-from typing import Any, Final
+from typing import Final
 
-from atg_fg.core.assumptions import Assumptions, arcube_assumptions
-from atg_fg.core.errors import AtgError, InvalidInputError
+from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
-from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence
-from atg_fg.core.records import TrialOutcome
+from atg_fg.core.records import TrialSummary
 from atg_fg.engines import begin_trial
 from atg_fg.experiments.scores import Score
-from atg_fg.experiments.table1 import TestPlan
 from atg_fg.experiments.trial import learn_from
-from atg_fg.report import checked
+from atg_fg.policies import EntropyPolicy
 from atg_fg.report.content import Look, Report, TrialPage, shown_parameters
-from atg_fg.report.summaries import read_looks, verdict_of, with_graphs
+from atg_fg.report.summaries import looks_of, told_truth, told_verdict, with_graphs
 from atg_fg.report.trial_record import best_objects
-from atg_fg.storage.trial_log import read_log
-from atg_fg.worlds.registry import ARCUBE_WORLDS, WORLDS, assumptions_of, make_world
+from atg_fg.storage.checked_json import placed
+from atg_fg.storage.recorded_test import RecordedTest
 
 #: How near a belief that is inferred again must be to the recorded one.
 _TOLERANCE: Final = 1e-6
@@ -38,71 +32,47 @@ _NOT_INFERRED: Final = (
 )
 
 
-def read_test_log(path: Path, memory: RobotMemory | None) -> Report:
-    """Return the page of a test's trials.
-
-    Args:
-        path: The log.
-        memory: Says what was taken for granted, where the log's world is a user's own.
+def test_report(test: RecordedTest) -> Report:
+    """Return the page of a recorded test's trials.
 
     Raises:
-        InvalidInputError: The file is not as it should be, or its world is not known.
+        InvalidInputError: There are none, or they do not follow from each other.
     """
-    return test_report(*read_log(path), path, memory)
-
-
-def test_report(
-    header: Mapping[str, Any], summaries: Sequence[Mapping[str, Any]], path: Path, memory: RobotMemory | None
-) -> Report:
-    """Return the page of a test's trials.
-
-    Args:
-        header: What test it is: its seed, and what its plan has other than usual.
-        summaries: Of its trials, in their order.
-        path: Where they come from, for messages.
-        memory: As for ``read_test_log``.
-
-    Raises:
-        InvalidInputError: As for ``read_test_log``.
-    """
-    if not summaries:
-        raise InvalidInputError(f"{path}: no trials; expected at least one")
-    plan = _plan(header, path)
-    assumptions = memory.assumptions if memory is not None else _assumptions(plan, path)
-    test = _Test(plan, assumptions)
-    pages = [test.page(summary, number, f"{path}: trial {number}") for number, summary in enumerate(summaries)]
-    title = f"A test of {len(pages)} trials, {test.score.successes} of them right"
-    notes = () if test.inferred else (_NOT_INFERRED,)
-    return Report(title, shown_parameters(header), notes, assumptions, tuple(pages))
+    if not test.trials:
+        raise InvalidInputError(f"{test.place}: no trials; expected at least one")
+    told = _Test(test)
+    pages = [told.page(trial, number) for number, trial in enumerate(test.trials)]
+    title = f"A test of {len(pages)} trials, {told.score.successes} of them right"
+    notes = () if told.inferred else (_NOT_INFERRED,)
+    return Report(title, shown_parameters(test.header), notes, test.assumptions, tuple(pages))
 
 
 class _Test:
     """The robot's memory and the score, trial after trial."""
 
-    def __init__(self, plan: TestPlan, assumptions: Assumptions) -> None:
-        self._plan = plan
-        self._assumptions = assumptions
-        self._memory = RobotMemory(assumptions)
+    def __init__(self, test: RecordedTest) -> None:
+        self._test = test
+        self._assumptions = test.assumptions
+        self._memory = RobotMemory(test.assumptions)
         self.score = Score()
         # Structure that is learned, and merges, take their time; such a memory does not follow from the log alone.
-        self.inferred = not (plan.parameters.learn_structure or plan.merge_duplicates)
+        self.inferred = not (test.parameters.learn_structure or test.header.get("merge_duplicates"))
 
-    def page(self, summary: Mapping[str, Any], number: int, place: str) -> TrialPage:
+    def page(self, trial: TrialSummary, number: int) -> TrialPage:
         """Return the page of the next trial, and learn from it."""
-        looks = read_looks(summary, self._assumptions, place)
-        verdict, matched = verdict_of(summary, place)
+        looks = looks_of(trial)
         if self.inferred:
             looks = self._with_beliefs(looks)
-        presented = checked.presented(summary["truth"][0], f"{place}: truth[0]")
-        met = "met before" if self.score.has_met(presented) else "never met before"
-        truth = f"{checked.told_truth(summary['truth'][-1])}, {met}"
-        page = TrialPage(f"trial {number}", verdict, truth, None, (), ())
-        page = with_graphs(page, looks, self._memory if self.inferred else None, self._assumptions, matched)
-        return replace(page, right=self._learn(summary, looks, matched, presented, place))
+        met = "met before" if self.score.has_met(trial.object) else "never met before"
+        truth = f"{told_truth(trial.truths[-1])}, {met}"
+        page = TrialPage(f"trial {number}", told_verdict(trial.verdict, trial.matched), truth, None, (), ())
+        page = with_graphs(page, looks, self._memory if self.inferred else None, self._assumptions, trial.matched)
+        return replace(page, right=self._learn(trial, f"{self._test.place}: trial {number}"))
 
     def _with_beliefs(self, looks: list[Look]) -> list[Look]:
         """Return the looks with the belief over objects, if the memory leads to what was recorded."""
-        inference = begin_trial("bayes-filter", self._memory, self._plan.parameters)
+        inference = begin_trial("bayes-filter", self._memory, self._test.parameters)
+        by_entropy = self._test.header.get("policy", EntropyPolicy.name) == EntropyPolicy.name
         found = []
         for look in looks:
             inference.observe(Evidence.of_detection(self._assumptions.alphabet, look.seen))
@@ -111,7 +81,7 @@ class _Test:
                 self.inferred = False
                 return looks
             expected: tuple[tuple[str, float], ...] = ()
-            if look.action is not None and self._plan.policy == "entropy":
+            if look.action is not None and by_entropy:
                 values = inference.expected_entropies().tolist()
                 expected = tuple(zip(self._assumptions.actions, values, strict=True))
             objects = best_objects(self._memory.names, belief.objects.tolist())
@@ -120,48 +90,9 @@ class _Test:
                 inference.act(self._assumptions.action_index(look.action))
         return found
 
-    def _learn(
-        self, summary: Mapping[str, Any], looks: list[Look], matched: str | None, presented: int | str, place: str
-    ) -> bool:
+    def _learn(self, trial: TrialSummary, place: str) -> bool:
         """Let the memory learn from a trial; return whether its verdict was right."""
-        alphabet = self._assumptions.alphabet
-        seen = [Evidence.of_detection(alphabet, look.seen).pattern for look in looks]
-        outcome = TrialOutcome(
-            verdict=summary["verdict"],
-            matched=matched,
-            patterns=tuple(summary.get("learned", seen)),
-            actions=tuple(self._assumptions.action_index(look.action) for look in looks if look.action is not None),
-            object=presented,
-            detections=tuple(look.seen for look in looks),
-        )
         before = self.score.successes
-        try:
-            learned = learn_from(outcome, self._memory)
-        except (AtgError, TypeError) as error:
-            raise InvalidInputError(f"{place}: {error}; expected what the trials before it lead to") from error
-        self.score.add(outcome, learned)
+        with placed(place):
+            self.score.add(trial, learn_from(trial, self._memory))
         return self.score.successes > before
-
-
-def _plan(header: Mapping[str, Any], path: Path) -> TestPlan:
-    """Return what the header says of the test, as far as the beliefs depend on it."""
-    try:
-        parameters = ModelParameters(**header.get("parameters", {}))
-        if not isinstance(header.get("world", ""), str):
-            raise InvalidInputError(f"world: {header['world']!r}; expected a name")
-        wanted = ("world", "world_options", "policy", "merge_duplicates", "n_objects")
-        return TestPlan(parameters=parameters, **{key: header[key] for key in wanted if key in header})
-    except (TypeError, ValueError, AtgError) as error:
-        raise InvalidInputError(f"{path}: header: {error}; expected what --records wrote") from error
-
-
-def _assumptions(plan: TestPlan, path: Path) -> Assumptions:
-    """Return what was taken for granted in the plan's world; no code that the file names is run for it."""
-    if plan.world in ARCUBE_WORLDS:
-        return arcube_assumptions(plan.n_objects)
-    if plan.world not in WORLDS:
-        raise InvalidInputError(
-            f"{path}: world {plan.world!r} is no world of this package; expected --memory FILE of such a world"
-        )
-    with closing(make_world(plan.world, n_objects=plan.n_objects, objects_seed=0, **plan.world_options)) as world:
-        return assumptions_of(world, plan.n_objects)

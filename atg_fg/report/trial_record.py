@@ -3,20 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from atg_fg.core import checks
 from atg_fg.core.assumptions import Assumptions, arcube_assumptions
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
-from atg_fg.report import checked
+from atg_fg.core.records import StepSummary
 from atg_fg.report.content import Look, Named, Report, TrialPage, shown_parameters
 from atg_fg.report.pictures import data_address
-from atg_fg.report.summaries import told_verdict, with_graphs
-from atg_fg.storage.checked_json import check_format, parse_json
+from atg_fg.report.summaries import look_of, told_truth, told_verdict, with_graphs
+from atg_fg.storage.checked_json import check_format, parse_json, read_info, read_list, read_object
 from atg_fg.storage.memory_json import read_assumptions
+from atg_fg.storage.trial_log import read_step, summary_of
 from atg_fg.storage.trial_record import TRIAL_FORMAT
 
 #: Remembered objects that are shown by name at each look.
@@ -35,14 +38,14 @@ def read_trial_record(text: str, path: Path, memory: RobotMemory | None) -> Repo
     Raises:
         InvalidInputError: A line is not as it should be, or the memory is of another trial.
     """
-    lines = [parse_json(line, f"{path}: line {number}") for number, line in enumerate(text.splitlines(), 1)]
+    lines = [parse_json(line, f"{path}: line {number}") for number, line in enumerate(_lines(text), 1)]
     if len(lines) < 3:
         raise InvalidInputError(f"{path}: {len(lines)} lines; expected a header, a line a look and the verdict")
     header, *steps, last = lines
-    for key in ("format", "version"):
-        checked.field_of(header, key, f"{path}: line 1")
-    check_format(header, TRIAL_FORMAT, f"{path}: line 1")
-    names = checked.texts(checked.field_of(header, "objects", f"{path}: line 1"), f"{path}: line 1: objects")
+    first = f"{path}: line 1"
+    check_format(_holding(header, first, "format", "version", "objects"), TRIAL_FORMAT, first)
+    read_info(header, first)
+    names = list(checks.names(header["objects"], f"{first}: objects"))
     assumptions = _assumptions(header, memory, path)
     # A memory that was saved after the trial may have one object more.
     if memory is not None and list(memory.names)[: len(names)] != names:
@@ -53,18 +56,23 @@ def read_trial_record(text: str, path: Path, memory: RobotMemory | None) -> Repo
     looks = [
         _look(step, names, assumptions, path.parent, f"{path}: line {number}") for number, step in enumerate(steps, 2)
     ]
-    verdict = checked.field_of(last, "verdict", f"{path}: line {len(lines)}")
-    outcome = str(checked.field_of(verdict, "outcome", f"{path}: line {len(lines)}: verdict"))
-    matched = verdict.get("matched")
+    place = f"{path}: line {len(lines)}"
+    end = _holding(_holding(last, place, "verdict")["verdict"], f"{place}: verdict", "outcome", "matched", "truth")
+    lost = end["truth"] if end["outcome"] == "lost" else None
+    trial = summary_of(
+        {"verdict": end["outcome"], "matched": end["matched"], "lost_truth": lost},
+        [step for step, _ in looks],
+        f"{place}: verdict",
+    )
     page = TrialPage(
         title="trial",
-        verdict=told_verdict(outcome, matched),
-        truth=checked.told_truth(verdict.get("truth")),
+        verdict=told_verdict(trial.verdict, trial.matched),
+        truth=told_truth(read_info(end["truth"], f"{place}: verdict: truth")),
         right=None,
         looks=(),
         graphs=(),
     )
-    page = with_graphs(page, looks, memory, assumptions, None if matched is None else str(matched))
+    page = with_graphs(page, [look for _, look in looks], memory, assumptions, trial.matched)
     notes = () if memory is not None or not names else (_NO_MEMORY,)
     parameters = shown_parameters({key: value for key, value in header.items() if key not in _OWN})
     return Report("A trial, look by look", parameters, notes, assumptions, (page,))
@@ -86,36 +94,31 @@ def _assumptions(header: Mapping[str, Any], memory: RobotMemory | None, path: Pa
     return memory.assumptions
 
 
-def _look(step: Any, names: list[str], assumptions: Assumptions, folder: Path, place: str) -> Look:
+def _look(step: Any, names: list[str], assumptions: Assumptions, folder: Path, place: str) -> tuple[StepSummary, Look]:
     """Return a line as a look."""
-    shares = checked.numbers(checked.field_of(step, "objects", place), f"{place}: objects", len(names), most=1.0)
-    truth = step.get("truth")
-    purpose = step.get("purpose")
-    return Look(
-        checked.detection(checked.field_of(step, "observed", place), assumptions, f"{place}: observed"),
-        checked.number(checked.field_of(step, "unseen", place), f"{place}: unseen", most=1.0),
-        checked.number(checked.field_of(step, "entropy", place), f"{place}: entropy"),
-        best_objects(names, shares),
-        _expected(step.get("expected_entropy"), assumptions, f"{place}: expected_entropy"),
-        checked.action(checked.field_of(step, "action", place), assumptions, f"{place}: action"),
-        None if purpose is None else str(purpose),
-        checked.shown(truth),
-        isinstance(truth, Mapping) and bool(truth.get("slipped")),
-        frame=data_address(step["frame"], folder, f"{place}: frame") if "frame" in step else None,
-    )
+    fields = _holding(step, place, "observed", "objects", "unseen", "entropy", "action", "truth")
+    entries = read_list(fields["objects"], f"{place}: objects")
+    if len(entries) != len(names):
+        raise InvalidInputError(f"{place}: objects: {len(entries)} numbers; expected {len(names)}")
+    shares = [
+        checks.number(entry, f"{place}: objects[{index}]", 0.0, 1.0, slack=1e-6) for index, entry in enumerate(entries)
+    ]
+    read = read_step(fields, place, assumptions)
+    frame = data_address(fields["frame"], folder, f"{place}: frame") if "frame" in fields else None
+    return read, replace(look_of(read), objects=best_objects(names, shares), frame=frame)
+
+
+def _holding(value: Any, place: str, *keys: str) -> dict[str, Any]:
+    """Return ``value`` if it is an object with these keys, and perhaps others."""
+    return read_object(value, place, keys, optional=tuple(value) if isinstance(value, dict) else ())
+
+
+def _lines(text: str) -> list[str]:
+    """Return the lines of a text: only a line feed ends one, for JSON may hold other separators of lines."""
+    return text.removesuffix("\n").split("\n")
 
 
 def best_objects(names: list[str] | tuple[str, ...], shares: list[float]) -> Named:
     """Return the most probable objects with their probabilities, best first, the earlier one where two are alike."""
     order = np.argsort(-np.array(shares, dtype=np.float64), kind="stable")[:TOP].tolist()
     return tuple((names[index], shares[index]) for index in order)
-
-
-def _expected(value: Any, assumptions: Assumptions, place: str) -> Named:
-    if value is None:
-        return ()
-    if not isinstance(value, Mapping):
-        raise InvalidInputError(f"{place}: {value!r}; expected an object with a number for each action")
-    for name in value:
-        checked.action(name, assumptions, place)
-    return tuple((name, checked.number(entry, f"{place}: {name}")) for name, entry in value.items())

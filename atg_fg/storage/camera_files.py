@@ -9,18 +9,11 @@ from typing import Any, Final
 
 import numpy as np
 
+from atg_fg.core.checks import plain_text, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.senses.camera_calibration import Calibration
 from atg_fg.senses.tags import Tags, check_ids, dictionary_name
-from atg_fg.storage.checked_json import (
-    check_format,
-    parse_json,
-    placed,
-    read_integer,
-    read_list,
-    read_object,
-    read_text,
-)
+from atg_fg.storage.checked_json import check_format, parse_json, placed, read_list, read_object
 from atg_fg.storage.plain_files import read_text_file
 
 CALIBRATION_FORMAT: Final = "atg-fg/camera"
@@ -54,7 +47,7 @@ def read_calibration(path: Path | str) -> Calibration:
     size = read_list(document["image_size"], f"{place}: image_size")
     if len(size) != 2:
         raise InvalidInputError(f"{place}: image_size: {size!r}; expected width and height")
-    width, height = (read_integer(side, f"{place}: image_size", 1) for side in size)
+    width, height = (whole_number(side, f"{place}: image_size", 1) for side in size)
     with placed(place):
         return Calibration(
             document["intrinsics"], document["distortion"], (width, height), document.get("error_pixels")
@@ -136,8 +129,8 @@ def read_tags(path: Path | str) -> CubeTags:
     cubes = read_list(document.get("cubes", []), f"{place}: cubes")
     faces = tuple(_ids(each, f"{place}: cubes[{number}]") for number, each in enumerate(cubes))
     with placed(place):
-        return CubeTags(read_text(document["dictionary"], "dictionary"), float(size), ids, faces)
+        return CubeTags(plain_text(document["dictionary"], "dictionary"), float(size), ids, faces)
 
 
 def _ids(value: Any, place: str) -> tuple[int, ...]:
-    return tuple(read_integer(each, place, 0) for each in read_list(value, place))
+    return tuple(whole_number(each, place, 0) for each in read_list(value, place))

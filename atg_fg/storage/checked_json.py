@@ -6,23 +6,30 @@ Every reader takes the *place* of its value in the document and names it in the 
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+import math
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any, NoReturn
+from typing import Any, Final, NoReturn
 
 import numpy as np
 
+from atg_fg.core.checks import brief, plain_text
 from atg_fg.core.errors import InvalidInputError
 
+#: Levels of lists and objects in what a file may say freely, such as the truth of a look.
+MAX_DEPTH: Final = 20
 
-def parse_json(text: str, place: str) -> Any:
-    """Return the JSON document ``text``; NaN, Infinity and repeated keys are refused.
+
+def parse_json(document: str, place: str) -> Any:
+    """Return the JSON in the text ``document``; numbers that are not finite, and repeated keys, are refused.
 
     Raises:
         InvalidInputError: It is not JSON.
     """
     try:
-        return json.loads(text, parse_constant=_refuse_constant, object_pairs_hook=_unique_keys)
+        return json.loads(
+            document, parse_float=_finite, parse_constant=_refuse_constant, object_pairs_hook=_unique_keys
+        )
     except (ValueError, RecursionError, MemoryError) as error:
         raise InvalidInputError(f"{place}: not valid JSON: {str(error) or 'not enough memory'}") from error
 
@@ -32,6 +39,12 @@ def plain_json(value: Any) -> Any:
     if isinstance(value, (np.ndarray, np.generic)):
         return value.tolist()
     raise TypeError(f"a record cannot hold a {type(value).__name__}")
+
+
+def _finite(digits: str) -> float:
+    if math.isinf(value := float(digits)):
+        raise ValueError(f"{digits} is not a finite number")
+    return value
 
 
 def _refuse_constant(name: str) -> NoReturn:
@@ -50,7 +63,7 @@ def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
 def read_object(value: Any, place: str, keys: tuple[str, ...], optional: tuple[str, ...] = ()) -> dict[str, Any]:
     """Return ``value`` if it is an object with exactly these keys, and perhaps optional ones."""
     if not isinstance(value, dict):
-        raise InvalidInputError(f"{place}: {_brief(value)}; expected an object with {', '.join(keys)}")
+        raise InvalidInputError(f"{place}: {brief(value)}; expected an object with {', '.join(keys)}")
     for key in value:
         if key not in keys + optional:
             raise InvalidInputError(f"{place}: unknown key {key!r}; expected {', '.join(keys + optional)}")
@@ -63,35 +76,40 @@ def read_object(value: Any, place: str, keys: tuple[str, ...], optional: tuple[s
 def read_list(value: Any, place: str) -> list[Any]:
     """Return ``value`` if it is a list."""
     if not isinstance(value, list):
-        raise InvalidInputError(f"{place}: {_brief(value)}; expected a list")
+        raise InvalidInputError(f"{place}: {brief(value)}; expected a list")
     return value
 
 
-def read_integer(value: Any, place: str, least: int) -> int:
-    """Return ``value`` if it is a whole number of at least ``least``."""
-    if isinstance(value, bool) or not isinstance(value, int) or value < least:
-        raise InvalidInputError(f"{place}: {_brief(value)}; expected a whole number of at least {least}")
+def read_info(value: Any, place: str) -> dict[str, Any]:
+    """Return ``value`` if it is an object, of whatever is not nested too deeply and can be written in UTF-8."""
+    if not isinstance(value, dict):
+        raise InvalidInputError(f"{place}: {brief(value)}; expected an object")
+    _check_plain(value, place, MAX_DEPTH)
     return value
 
 
-def read_text(value: Any, place: str) -> str:
-    """Return ``value`` if it is a text that is not empty and can be written in UTF-8."""
-    if not isinstance(value, str) or not value:
-        raise InvalidInputError(f"{place}: {_brief(value)}; expected a text that is not empty")
-    try:
-        value.encode()
-    except UnicodeError as error:  # JSON can say half a character
-        raise InvalidInputError(f"{place}: {_brief(value)}; expected a text of whole characters") from error
-    return value
+def _check_plain(value: Any, place: str, depth: int) -> None:
+    if not depth:
+        raise InvalidInputError(f"{place}: nested too deeply; expected at most {MAX_DEPTH} levels")
+    if isinstance(value, str) and value:
+        plain_text(value, place)
+    elif isinstance(value, (dict, list)):
+        for each in (*value, *value.values()) if isinstance(value, dict) else value:
+            _check_plain(each, place, depth - 1)
+
+
+def without_none(fields: Mapping[str, Any], but_for: Collection[str] = ()) -> dict[str, Any]:
+    """Return fields without those that are ``None``, but for some."""
+    return {name: value for name, value in fields.items() if value is not None or name in but_for}
 
 
 def check_format(document: dict[str, Any], name: str, place: str) -> None:
     """Check the keys ``format`` and ``version`` of a document."""
     if document["format"] != name:
-        raise InvalidInputError(f"{place}: format: {_brief(document['format'])}; expected {name!r}")
+        raise InvalidInputError(f"{place}: format: {brief(document['format'])}; expected {name!r}")
     version = document["version"]
     if isinstance(version, bool) or version != 1:
-        raise InvalidInputError(f"{place}: version: {_brief(version)}; expected 1")
+        raise InvalidInputError(f"{place}: version: {brief(version)}; expected 1")
 
 
 @contextmanager
@@ -101,8 +119,3 @@ def placed(place: str) -> Iterator[None]:
         yield
     except InvalidInputError as error:
         raise InvalidInputError(f"{place}: {error}") from error
-
-
-def _brief(value: Any) -> str:
-    text = repr(value)
-    return text if len(text) <= 60 else text[:57] + "..."

@@ -12,11 +12,12 @@ from typing import Final
 import numpy as np
 
 from atg_fg.core.assumptions import MAX_NUMBER, Assumptions
+from atg_fg.core.checks import plain_text
 from atg_fg.core.compact.columns import AnyIntArray
 from atg_fg.core.compact.compact_memory import CompactMemory, GraphArrays, compacted
 from atg_fg.core.errors import InvalidInputError, TooLargeError
 from atg_fg.core.patterns import IntArray
-from atg_fg.storage.checked_json import check_format, parse_json, placed, read_list, read_object, read_text
+from atg_fg.storage.checked_json import check_format, parse_json, placed, read_list, read_object
 from atg_fg.storage.limits import refuse_size, unpacked_limit
 from atg_fg.storage.memory_json import read_assumptions, write_assumptions
 from atg_fg.storage.plain_files import read_bytes_file, starts_with, write_bytes_atomically
@@ -90,7 +91,7 @@ def load_compact_memory(path: Path | str) -> CompactMemory:
     assumptions = read_assumptions(header["assumptions"], f"{place}: assumptions")
     names = read_list(header["names"], f"{place}: names")
     for number, name in enumerate(names):
-        read_text(name, f"{place}: names[{number}]")
+        plain_text(name, f"{place}: names[{number}]")
     if len(set(names)) < len(names):
         raise InvalidInputError(f"{place}: names: one is repeated; expected unique names")
     arrays = GraphArrays(**read)

@@ -9,7 +9,7 @@ from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.compact.compact_memory import CompactMemory
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
-from atg_fg.core.records import Experiment, StoredTrial
+from atg_fg.core.records import Experiment, TrialSummary
 from atg_fg.learning.structured_memory import StructuredMemory
 from atg_fg.storage.compact_file import is_compact, load_compact_memory, save_compact_memory
 from atg_fg.storage.database.connection import WAIT, is_database, open_to_read, open_to_write, translated, written
@@ -58,7 +58,7 @@ def save_memory(memory: RobotMemory, path: Path | str) -> None:
         write_bytes_atomically(path, memory_to_json(memory).encode())
 
 
-def save_trial(memory: RobotMemory, path: Path | str, trial: StoredTrial, experiment: Experiment) -> None:
+def save_trial(memory: RobotMemory, path: Path | str, trial: TrialSummary, experiment: Experiment) -> None:
     """Save a memory that has learned from a trial; a database gets the record of the trial in the same transaction.
 
     A memory that is kept in its file has both there already.

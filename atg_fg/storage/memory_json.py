@@ -7,19 +7,12 @@ from typing import Any, Final
 
 from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.assumptions import Assumptions
+from atg_fg.core.checks import plain_text, whole_number
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.merging import Merge
 from atg_fg.core.patterns import PatternAlphabet
 from atg_fg.learning.structured_memory import StructuredMemory
-from atg_fg.storage.checked_json import (
-    check_format,
-    parse_json,
-    placed,
-    read_integer,
-    read_list,
-    read_object,
-    read_text,
-)
+from atg_fg.storage.checked_json import check_format, parse_json, placed, read_list, read_object
 from atg_fg.storage.structure_json import read_learner, write_learner
 
 MEMORY_FORMAT: Final = "atg-fg/memory"
@@ -89,8 +82,8 @@ def _read_merge(value: Any, assumptions: Assumptions, place: str) -> Merge:
     return Merge(
         read_graph(fields["kept"], assumptions, f"{place}.kept"),
         read_graph(fields["dropped"], assumptions, f"{place}.dropped"),
-        read_integer(fields["position"], f"{place}.position", least=0),
-        tuple(read_integer(number, f"{place}.trials[{index}]", least=0) for index, number in enumerate(trials)),
+        whole_number(fields["position"], f"{place}.position", least=0),
+        tuple(whole_number(number, f"{place}.trials[{index}]", least=0) for index, number in enumerate(trials)),
     )
 
 
@@ -99,13 +92,13 @@ def read_assumptions(value: Any, place: str) -> Assumptions:
     fields = read_object(value, place, ("n_objects", "n_aspects", "actions", "slots", "n_symbols"))
     texts = {
         key: tuple(
-            read_text(name, f"{place}.{key}[{index}]")
+            plain_text(name, f"{place}.{key}[{index}]")
             for index, name in enumerate(read_list(fields[key], f"{place}.{key}"))
         )
         for key in ("actions", "slots")
     }
     numbers = {
-        key: read_integer(fields[key], f"{place}.{key}", least=1) for key in ("n_objects", "n_aspects", "n_symbols")
+        key: whole_number(fields[key], f"{place}.{key}", least=1) for key in ("n_objects", "n_aspects", "n_symbols")
     }
     with placed(place):
         alphabet = PatternAlphabet(texts["slots"], numbers["n_symbols"])
@@ -136,7 +129,7 @@ def read_memory(value: Any, assumptions: Assumptions, place: str) -> RobotMemory
 def read_graph(value: Any, assumptions: Assumptions, place: str) -> AspectTransitionGraph:
     """Return the ATG at ``place``."""
     fields = read_object(value, place, ("name", "aspects", "transitions"))
-    graph = AspectTransitionGraph(read_text(fields["name"], f"{place}.name"), assumptions)
+    graph = AspectTransitionGraph(plain_text(fields["name"], f"{place}.name"), assumptions)
     for index, pattern in enumerate(read_list(fields["aspects"], f"{place}.aspects")):
         where = f"{place}.aspects[{index}]"
         with placed(where):
@@ -145,8 +138,8 @@ def read_graph(value: Any, assumptions: Assumptions, place: str) -> AspectTransi
         where = f"{place}.transitions[{index}]"
         edge = read_object(entry, where, ("from", "action", "to", "count"))
         action = assumptions.action_index(edge["action"], f"{where}.action")
-        ends = [read_integer(edge[key], f"{where}.{key}", least=0) for key in ("from", "to")]
-        count = read_integer(edge["count"], f"{where}.count", least=1)
+        ends = [whole_number(edge[key], f"{where}.{key}", least=0) for key in ("from", "to")]
+        count = whole_number(edge["count"], f"{where}.count", least=1)
         with placed(where):
             graph.add_transition(ends[0], action, ends[1], count)
     return graph

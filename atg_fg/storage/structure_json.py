@@ -9,12 +9,13 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 from atg_fg.core.assumptions import Assumptions
+from atg_fg.core.checks import whole_number
 from atg_fg.core.errors import InvalidInputError, TooLargeError
 from atg_fg.learning.learner import MAX_CANDIDATES, StructureLearner
 from atg_fg.learning.rates import PRIORS, Rates
 from atg_fg.learning.raw_trials import RawTrial
 from atg_fg.learning.shared_structure import SharedStructure
-from atg_fg.storage.checked_json import read_integer, read_list, read_object
+from atg_fg.storage.checked_json import read_list, read_object
 
 
 def write_learner(learner: StructureLearner, first: int = 0) -> dict[str, Any]:
@@ -49,8 +50,8 @@ def read_learner(value: Any, assumptions: Assumptions, names: Sequence[str], pla
         InvalidInputError: Anything malformed; the message names the place.
     """
     fields = read_object(value, place, ("seed", "rates", "candidates", "trials"), optional=("evaluations",))
-    learner = StructureLearner(assumptions, read_integer(fields["seed"], f"{place}.seed", least=0))
-    learner.n_evaluations = read_integer(fields.get("evaluations", 0), f"{place}.evaluations", least=0)
+    learner = StructureLearner(assumptions, whole_number(fields["seed"], f"{place}.seed", least=0))
+    learner.n_evaluations = whole_number(fields.get("evaluations", 0), f"{place}.evaluations", least=0)
     candidates = read_list(fields["candidates"], f"{place}.candidates")
     if len(candidates) > MAX_CANDIDATES:
         raise InvalidInputError(f"{place}.candidates: {len(candidates)} structures; expected at most {MAX_CANDIDATES}")
@@ -102,7 +103,7 @@ def read_structure(value: Any, assumptions: Assumptions, place: str) -> SharedSt
         InvalidInputError: It is none for these slots and actions; the message names the place.
     """
     fields = read_object(value, place, ("registers", "sources"))
-    n_registers = read_integer(fields["registers"], f"{place}.registers", least=len(assumptions.alphabet.slots))
+    n_registers = whole_number(fields["registers"], f"{place}.registers", least=len(assumptions.alphabet.slots))
     if n_registers > MAX_REGISTERS:
         raise InvalidInputError(f"{place}.registers: {n_registers}; expected at most {MAX_REGISTERS}")
     by_action = read_object(fields["sources"], f"{place}.sources", assumptions.actions)
@@ -117,7 +118,7 @@ def read_structure(value: Any, assumptions: Assumptions, place: str) -> SharedSt
 
 def _read_sources(value: Any, n_registers: int, place: str) -> tuple[int, ...]:
     entries: Sequence[Any] = read_list(value, place)
-    sources = tuple(read_integer(entry, f"{place}[{index}]", least=0) for index, entry in enumerate(entries))
+    sources = tuple(whole_number(entry, f"{place}[{index}]", least=0) for index, entry in enumerate(entries))
     if len(sources) != n_registers or max(sources) >= n_registers:
         raise InvalidInputError(f"{place}: {list(sources)}; expected {n_registers} numbers of 0 to {n_registers - 1}")
     return sources

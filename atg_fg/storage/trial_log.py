@@ -1,28 +1,182 @@
-"""The trials of one test in a file that grows trial by trial, and is sound whenever it is cut off.
+"""What is kept of a trial as a line of JSON, and the trials of one test as a file of such lines (``….jsonl.gz``).
 
-Each line is a gzip member of its own: a header, then a trial a line. A writer that is killed leaves at most half of the
-last member, which ``read`` drops. A trial is put where it belongs rather than at the end of the file, so that two
-writers of one test do no harm: a worker of a cluster that is taken for lost may still be at it.
+All readers of records go by ``from_line``, or by ``read_step`` and ``summary_of`` where a record comes in other pieces:
+whatever is of a wrong type, out of its range, or does not fit the rest is refused here, and nowhere else.
 """
 
 from __future__ import annotations
 
-import gzip
-import json
-import zlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 from atg_fg.core.assumptions import Assumptions
-from atg_fg.core.errors import AtgError, InvalidInputError
+from atg_fg.core.checks import number, one_of, plain_text, whole_number
+from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import Detection, Evidence
-from atg_fg.core.records import TrialOutcome, TrialRecord
-from atg_fg.storage.checked_json import plain_json
-from atg_fg.storage.limits import gzip_members
-from atg_fg.storage.plain_files import append_bytes, check_writable, read_bytes_file, write_bytes_atomically
+from atg_fg.core.records import VERDICTS, StepSummary, TrialSummary
+from atg_fg.storage.checked_json import read_info, read_list, read_object, without_none
+from atg_fg.storage.growing_file import GrowingFile, read_lines
 
-_FORMAT = {"format": "atg-fg/test", "version": 1}
+_FORMAT: Final = {"format": "atg-fg/test", "version": 1}
+_KEYS: Final = ("verdict", "matched", "observed", "actions", "unseen", "entropy", "truth")
+#: Rounding may carry a probability or an entropy this far past its bound.
+_SLACK: Final = 1e-6
+
+
+def to_line(trial: TrialSummary) -> dict[str, Any]:
+    """Return a trial as logs and runs have it."""
+    purposes = [step.purpose for step in trial.steps]
+    patterns = trial.learned_patterns
+    return without_none(
+        {
+            "verdict": trial.verdict,
+            "matched": trial.matched,
+            "observed": [list(step.observed) for step in trial.steps],
+            "actions": list(trial.actions),
+            "unseen": [step.unseen for step in trial.steps],
+            "entropy": [step.entropy for step in trial.steps],
+            "purpose": purposes if any(purposes) else None,
+            "truth": list(trial.truths),
+            "learned": None if patterns is None else list(patterns),
+        },
+        but_for=("matched",),
+    )
+
+
+def from_line(line: Any, place: str, assumptions: Assumptions | None = None) -> TrialSummary:
+    """Return the trial in a line.
+
+    Args:
+        line: The JSON document.
+        place: Named in errors.
+        assumptions: Of the trial; without them, patterns are not known, and symbols and actions not checked.
+
+    Raises:
+        InvalidInputError: Anything in it is not as it should be.
+    """
+    fields = read_object(line, place, _KEYS, optional=("purpose", "learned"))
+    looks = len(read_list(fields["observed"], f"{place}: observed"))
+    lost = fields["verdict"] == "lost"
+    actions = list(read_list(fields["actions"], f"{place}: actions"))
+    # An action may be the last thing that is recorded: of an object that is lost, no look follows.
+    if len(actions) not in ((looks,) if lost else (looks - 1, looks)):
+        raise InvalidInputError(f"{place}: {looks} looks, {len(actions)} actions; expected one look more")
+    actions += [None] * (looks - len(actions))
+    columns = {
+        name: _column(fields[name] if name in fields else [None] * looks, f"{place}: {name}", length)
+        for name, length in (
+            ("unseen", looks),
+            ("entropy", looks),
+            ("purpose", looks),
+            ("truth", looks + lost),
+        )
+    }
+    steps = [
+        read_step(
+            {
+                "observed": fields["observed"][time],
+                **{name: columns[name][time] for name in ("unseen", "entropy", "purpose", "truth")},
+                "action": actions[time],
+            },
+            f"{place}: look {time}",
+            assumptions,
+        )
+        for time in range(looks)
+    ]
+    lost_truth = columns["truth"][-1] if lost else None
+    return summary_of({**fields, "lost_truth": lost_truth}, steps, place, assumptions)
+
+
+def read_step(fields: Mapping[str, Any], place: str, assumptions: Assumptions | None = None) -> StepSummary:
+    """Return one look of a record; arguments and errors are those of ``from_line``."""
+    observed = _detection(fields["observed"], f"{place}: observed", assumptions)
+    action, purpose, log_evidence, expected = map(fields.get, ("action", "purpose", "log_evidence", "expected_entropy"))
+    if action is not None and assumptions is not None:
+        action = one_of(action, f"{place}: action", assumptions.actions)
+    if assumptions is None:
+        pattern = fields.get("pattern")
+        pattern = None if pattern is None else whole_number(pattern, f"{place}: pattern")
+    else:
+        pattern = Evidence.of_detection(assumptions.alphabet, observed).pattern
+    return StepSummary(
+        observed,
+        pattern,
+        number(fields["unseen"], f"{place}: unseen", 0.0, 1.0, _SLACK),
+        number(fields["entropy"], f"{place}: entropy", 0.0, slack=_SLACK),
+        _truth(fields["truth"], f"{place}: truth"),
+        None if action is None else plain_text(action, f"{place}: action"),
+        None if purpose is None else plain_text(purpose, f"{place}: purpose"),
+        None if log_evidence is None else number(log_evidence, f"{place}: log_evidence"),
+        None if expected is None else _expected(expected, f"{place}: expected_entropy", assumptions),
+    )
+
+
+def summary_of(
+    fields: Mapping[str, Any], steps: Sequence[StepSummary], place: str, assumptions: Assumptions | None = None
+) -> TrialSummary:
+    """Return a trial of these looks.
+
+    Args:
+        fields: ``verdict``, and what there is of ``matched``, ``lost_truth`` and ``learned``, the patterns learned.
+        steps: The looks.
+        place: As for ``from_line``.
+        assumptions: As for ``from_line``.
+
+    Raises:
+        InvalidInputError: As for ``from_line``.
+    """
+    verdict = next(known for known in VERDICTS if known == one_of(fields["verdict"], f"{place}: verdict", VERDICTS))
+    matched, lost_truth, learned = map(fields.get, ("matched", "lost_truth", "learned"))
+    if not steps:
+        raise InvalidInputError(f"{place}: no looks; expected at least one")
+    if (verdict == "known") != (matched is not None):
+        raise InvalidInputError(
+            f"{place}: verdict {verdict}, matched {matched!r:.60}; expected a match of what is known only"
+        )
+    if (verdict == "lost") != (lost_truth is not None):
+        raise InvalidInputError(f"{place}: verdict {verdict}; expected the last truth of what is lost only")
+    if learned is not None:
+        most = None if assumptions is None else len(assumptions.alphabet) - 1
+        learned = tuple(
+            None if entry is None else whole_number(entry, f"{place}: learned[{index}]", 0, most)
+            for index, entry in enumerate(_column(learned, f"{place}: learned", len(steps)))
+        )
+    return TrialSummary(
+        verdict,
+        None if matched is None else plain_text(matched, f"{place}: matched"),
+        tuple(steps),
+        None if lost_truth is None else _truth(lost_truth, f"{place}: truth[{len(steps)}]"),
+        learned_patterns=learned,
+    )
+
+
+def _column(value: Any, place: str, length: int) -> list[Any]:
+    found = read_list(value, place)
+    if len(found) != length:
+        raise InvalidInputError(f"{place}: {len(found)} entries; expected {length}")
+    return list(found)
+
+
+def _detection(value: Any, place: str, assumptions: Assumptions | None) -> Detection:
+    entries = read_list(value, place)
+    if assumptions is not None:
+        return assumptions.alphabet.check_detection(entries, place)
+    return tuple(None if entry is None else whole_number(entry, place) for entry in entries)
+
+
+def _truth(value: Any, place: str) -> dict[str, Any]:
+    truth = read_info(value, place)
+    presented = truth.get("object")
+    if presented is not None and (isinstance(presented, bool) or not isinstance(presented, (int, str))):
+        raise InvalidInputError(f"{place}: object: {presented!r:.60}; expected a whole number or a name")
+    return truth
+
+
+def _expected(value: Any, place: str, assumptions: Assumptions | None) -> dict[str, float]:
+    """Return the expected entropy of each action; without assumptions, of those that there are."""
+    entries = read_info(value, place) if assumptions is None else read_object(value, place, assumptions.actions)
+    return {name: number(entry, f"{place}: {name}", 0.0, slack=_SLACK) for name, entry in entries.items()}
 
 
 class TrialLog:
@@ -31,132 +185,48 @@ class TrialLog:
     Args:
         path: The file, ``….jsonl.gz``.
         header: What test this is; a file of another one is refused.
-        assumptions: Of the memory; names the actions.
+        assumptions: Of the memory.
     """
 
     def __init__(self, path: Path, header: Mapping[str, Any], assumptions: Assumptions) -> None:
-        self.path = path
+        self._file = GrowingFile(path, {**_FORMAT, **header}, "the trials", packed=True)
         self._assumptions = assumptions
-        self._end = path.stat().st_size if path.exists() else 0
-        self._header = json.loads(json.dumps({**_FORMAT, **header}, default=plain_json))
 
-    def begin(self) -> list[TrialOutcome]:
+    def begin(self) -> list[TrialSummary]:
         """Make the file, with its header, and return the trials in it: none.
 
         Raises:
             InvalidInputError: It is already there, or cannot be written.
         """
-        check_not_begun(self.path)
-        check_writable(self.path)
-        content = _member(self._header)
-        write_bytes_atomically(self.path, content)
-        self._end = len(content)
+        self._file.begin()
         return []
 
-    def resume(self) -> list[TrialOutcome]:
+    def resume(self) -> list[TrialSummary]:
         """Return the trials that are in the file, cutting off half a trial at its end; begin it if it is not there.
 
         Raises:
             InvalidInputError: The file cannot be read, or is of another test.
         """
-        if not self.path.exists():
-            return self.begin()
-        lines, sound = _sound_lines(self.path)
-        if not lines or lines[0] != self._header:
-            found = json.dumps(lines[0]) if lines else "nothing"
-            raise InvalidInputError(f"{self.path}: holds {found}; expected the trials of {json.dumps(self._header)}")
-        with self.path.open("r+b") as file:
-            file.truncate(sound)
-        self._end = sound
-        return [outcome_of(line, self._assumptions, str(self.path)) for line in lines[1:]]
+        return [
+            from_line(line, f"{self._file.path}: trial {index}", self._assumptions)
+            for index, line in enumerate(self._file.resume())
+        ]
 
-    def append(self, record: TrialRecord, outcome: TrialOutcome | None = None) -> None:
-        """Add a trial to the file, and what is learned from it if that is not what was seen.
-
-        Raises:
-            InvalidInputError: The disk is full, or the file cannot be written for another reason; ``resume`` goes on.
-        """
-        line = summary_of(record)
-        if outcome is not None and outcome.patterns != tuple(record.patterns):
-            line["learned"] = outcome.patterns
-        self._end = append_bytes(self.path, _member(line), self._end)
+    def append(self, trial: TrialSummary) -> None:
+        """Add a trial to the file."""
+        self._file.append(to_line(trial))
 
 
-def outcome_of(line: Mapping[str, Any], assumptions: Assumptions, place: str) -> TrialOutcome:
-    """Return what scoring and learning need of a trial in a log.
+def read_log(path: Path) -> tuple[dict[str, Any], list[Any]]:
+    """Return the header of a file, without format and version, and the lines of its trials, which are not checked yet.
 
-    Raises:
-        InvalidInputError: It is no such trial; the message names ``place``.
-    """
-    alphabet, names = assumptions.alphabet, assumptions.actions
-    try:
-        seen: list[Detection] = [tuple(detection) for detection in line["observed"]]
-        return TrialOutcome(
-            line["verdict"],
-            line["matched"],
-            tuple(line.get("learned", [Evidence.of_detection(alphabet, each).pattern for each in seen])),
-            tuple(names.index(action) for action in line["actions"]),
-            line["truth"][0]["object"],
-            tuple(seen),
-        )
-    except (KeyError, IndexError, TypeError, ValueError) as error:
-        raise InvalidInputError(f"{place}: {error!r}; expected a trial a line") from error
-
-
-def check_not_begun(path: Path) -> None:
-    """Raise ``InvalidInputError`` if there is a file of records already."""
-    if path.exists():
-        raise InvalidInputError(f"{path}: is already there; expected another folder, or --resume to go on")
-
-
-def summary_of(record: TrialRecord) -> dict[str, Any]:
-    """Return what is kept of a trial: what was seen and done, what was believed, and the truth."""
-    truths = [step.truth for step in record.steps]
-    purposes = [step.purpose for step in record.steps]
-    return {
-        "verdict": record.verdict,
-        "matched": record.matched,
-        "observed": [step.detection for step in record.steps],
-        "actions": [record.assumptions.actions[action] for action in record.actions],
-        "unseen": [step.belief.unseen for step in record.steps],
-        "entropy": [step.belief.entropy for step in record.steps],
-        **({"purpose": purposes} if any(purposes) else {}),
-        "truth": truths if record.lost_truth is None else [*truths, record.lost_truth],
-    }
-
-
-def read_trials(path: Path) -> list[dict[str, Any]]:
-    """Return the trials in a file as they were logged, without the header; errors are those of ``read_log``."""
-    return read_log(path)[1]
-
-
-def read_log(path: Path) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """Return the header of a file, without format and version, and its trials; half a trial at the end is left out.
+    Half a trial at the end is left out.
 
     Raises:
         InvalidInputError: The file cannot be read, or is not such a file.
     """
-    lines, _ = _sound_lines(path)
+    lines = read_lines(path, packed=True)
     header = lines[0] if lines and isinstance(lines[0], dict) else {}
     if {name: header.get(name) for name in _FORMAT} != _FORMAT:
         raise InvalidInputError(f"{path}: is not a log of trials; expected a file that --records wrote")
     return {name: value for name, value in header.items() if name not in _FORMAT}, lines[1:]
-
-
-def _member(line: Mapping[str, Any]) -> bytes:
-    text = json.dumps(line, default=plain_json, allow_nan=False, separators=(",", ":")) + "\n"
-    return gzip.compress(text.encode(), mtime=0)
-
-
-def _sound_lines(path: Path) -> tuple[list[dict[str, Any]], int]:
-    """Return the lines of all whole members, and how many bytes they are."""
-    try:
-        lines, sound = [], 0
-        for text, end in gzip_members(read_bytes_file(path), path):
-            lines.append(json.loads(text))
-            sound = end
-    except (zlib.error, ValueError, RecursionError) as error:
-        if isinstance(error, AtgError):
-            raise
-        raise InvalidInputError(f"{path}: cannot be read: {error}; expected a log of trials") from error
-    return lines, sound

@@ -22,7 +22,7 @@ def detection_of(observation: IntArray) -> Detection:
 
 def probability_option(name: str, value: float) -> float:
     """Return ``value`` if it is a probability, else raise ``InvalidInputError``."""
-    if not 0 <= value <= 1:
+    if not isinstance(value, (int, float, np.number)) or not 0 <= value <= 1:
         raise InvalidInputError(f"{name}: {value!r}; expected a probability from 0 to 1")
     return float(value)
 

@@ -87,6 +87,7 @@ def ring_locks(n_objects: int, seed: int, *, n_rings: int = 2, n_symbols: int = 
     if n_rings not in (2, 3):
         raise InvalidInputError(f"n_rings: {n_rings!r}; expected 2 or 3")
     _check_count("n_symbols", n_symbols, n_rings * _N_RING)
+    alphabet = PatternAlphabet(("left", "right") if n_rings == 2 else ("left", "middle", "right"), n_symbols)
     start = tuple((ring, 0) for ring in range(n_rings))
     states, mechanism = closed_mechanism(start, (_swap, partial(_turn_ring, 0), partial(_turn_ring, n_rings - 1)))
 
@@ -94,9 +95,8 @@ def ring_locks(n_objects: int, seed: int, *, n_rings: int = 2, n_symbols: int = 
         symbols = rng.permutation(n_symbols)[: n_rings * _N_RING].reshape(n_rings, _N_RING).tolist()
         return FiniteObject(mechanism, tuple(tuple(symbols[ring][turn] for ring, turn in state) for state in states))
 
-    slots = ("left", "right") if n_rings == 2 else ("left", "middle", "right")
     objects = _different(n_objects, draw, _generator(seed))
-    return ObjectFamily(("swap", "turn-left", "turn-right"), PatternAlphabet(slots, n_symbols), objects)
+    return ObjectFamily(("swap", "turn-left", "turn-right"), alphabet, objects)
 
 
 #: From left to right: which ring is there, and how far it is turned.
@@ -120,6 +120,7 @@ def lid_boxes(n_objects: int, seed: int, *, n_symbols: int = 12) -> ObjectFamily
     The lid comes off once and for all; then the top shows what is inside. 8 states, four with the lid on.
     """
     _check_count("n_symbols", n_symbols, _N_WALLS + 2)
+    alphabet = PatternAlphabet(("front", "right", "top"), n_symbols)
     states, mechanism = closed_mechanism((False, 0), (_open, partial(_turn_box, -1), partial(_turn_box, 1)))
 
     def draw(rng: np.random.Generator) -> FiniteObject:
@@ -131,7 +132,7 @@ def lid_boxes(n_objects: int, seed: int, *, n_symbols: int = 12) -> ObjectFamily
         )
 
     objects = _different(n_objects, draw, _generator(seed))
-    return ObjectFamily(("open", "left", "right"), PatternAlphabet(("front", "right", "top"), n_symbols), objects)
+    return ObjectFamily(("open", "left", "right"), alphabet, objects)
 
 
 #: Whether a box is open, and the wall in front; walls are numbered anticlockwise as seen from above.

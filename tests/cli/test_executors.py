@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from atg_fg import cli
-from atg_fg.storage.trial_log import read_trials
+from atg_fg.storage.trial_log import read_log
 from tests.dask_cluster import ROOT, wait_for
 
 #: Two tests that take long enough to be met in the middle, even on a quick machine.
@@ -54,7 +54,7 @@ def workers_of(process):
 
 
 def some_trials(folder):
-    return any(len(read_trials(path)) >= 2 for path in folder.glob("test-*.jsonl.gz"))
+    return any(len(read_log(path)[1]) >= 2 for path in folder.glob("test-*.jsonl.gz"))
 
 
 def some_lines(log):

@@ -7,8 +7,8 @@ from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.assumptions import Assumptions, arcube_assumptions
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.patterns import PatternAlphabet
-from atg_fg.core.records import TrialOutcome, TrialRecord
-from atg_fg.core.table import Bar, HtmlTable, shortened
+from atg_fg.core.records import TrialRecord, TrialSummary
+from atg_fg.core.table import Bar, Table, shortened
 from atg_fg.engines import begin_trial
 from atg_fg.experiments.trial import learn_from, run_trial
 from atg_fg.learning.learner import BelievedStructure
@@ -40,7 +40,7 @@ class Reader(HTMLParser):
         self.texts.append(data)
 
 
-TABLE = HtmlTable("Two cups", ("name", "share"), (("tea", Bar(0.25, "25 %")), ("milk", Bar(1.0, "100 %"))), "a note")
+TABLE = Table("Two cups", ("name", "share"), (("tea", Bar(0.25, "25 %")), ("milk", Bar(1.0, "100 %"))), "a note")
 
 
 def test_a_notebook_shows_title_headings_cells_and_note():
@@ -54,14 +54,14 @@ def test_print_shows_the_same_in_columns():
 
 def test_whatever_is_shown_is_escaped():
     evil = "<script>alert('&')</script>"
-    html = HtmlTable(evil, (evil,), ((evil,), (Bar(0.5, evil),)), evil)._repr_html_()
+    html = Table(evil, (evil,), ((evil,), (Bar(0.5, evil),)), evil)._repr_html_()
     assert "<script>" not in html
     assert Reader(html).texts == [evil] * 5
 
 
 def test_bars_are_as_long_as_their_share_and_never_longer_than_the_whole():
     for share, width in ((0.25, "25.0%"), (0.0, "0.0%"), (1.0, "100.0%"), (7.0, "100.0%"), (-1.0, "0.0%")):
-        html = HtmlTable("", ("bar",), ((Bar(share, ""),),))._repr_html_()
+        html = Table("", ("bar",), ((Bar(share, ""),),))._repr_html_()
         assert f"width: {width}" in html
 
 
@@ -74,7 +74,7 @@ def test_text_and_ground_keep_the_colours_of_the_theme():
 
 
 def test_without_columns_title_and_note_are_left():
-    empty = HtmlTable("Nothing", (), (), "a note")
+    empty = Table("Nothing", (), (), "a note")
     assert Reader(empty._repr_html_()).texts == ["Nothing", "a note"]
     assert str(empty) == "Nothing\na note"
 
@@ -181,7 +181,7 @@ def test_on_a_terminal_a_trial_is_one_line(records):
 
 
 def test_an_outcome_shows_what_was_presented_and_seen(records):
-    texts = shown(TrialOutcome.of(records[1]))
+    texts = shown(TrialSummary.of(records[1]))
     assert texts[0] == "Trial of 6 actions: known, object-000"
     assert texts[3] == "3"
     assert texts[4].startswith(str(records[1].detections[0]))

@@ -5,14 +5,21 @@ from pathlib import Path
 
 import pytest
 
-from atg_fg.core.assumptions import arcube_assumptions
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.experiments.rescore import rescore
 from atg_fg.experiments.table1 import TestPlan, run_test
 from atg_fg.storage.presets import preset
+from atg_fg.storage.recorded_test import recorded_tests
 from atg_fg.worlds.arcube import ACTION_SOURCES
 
 RECORDED = Path(__file__).parents[2] / "results" / "robonaut"
+
+
+def rescored(path, engine, parameters):
+    (test,) = recorded_tests(path)
+    return rescore(test, engine, parameters)
+
+
 PLAN = TestPlan(engine="bayes-filter", parameters=preset("default"), n_trials=25, n_actions=5)
 
 
@@ -21,7 +28,7 @@ PLAN = TestPlan(engine="bayes-filter", parameters=preset("default"), n_trials=25
 def test_the_model_that_ran_the_test_scores_as_it_did(tmp_path, name, world_options):
     plan = replace(PLAN, parameters=preset(name), world_options=world_options)
     ran = run_test(plan, 0, tmp_path)
-    again = rescore(tmp_path / "test-0000.jsonl.gz", arcube_assumptions(), "bayes-filter", preset(name))
+    again = rescored(tmp_path / "test-0000.jsonl.gz", "bayes-filter", preset(name))
     assert (again.identification, again.recognition, again.success) == (
         ran.identification,
         ran.recognition,
@@ -32,7 +39,7 @@ def test_the_model_that_ran_the_test_scores_as_it_did(tmp_path, name, world_opti
 def test_engines_judge_alike(tmp_path):
     run_test(PLAN, 1, tmp_path)
     path = tmp_path / "test-0001.jsonl.gz"
-    first, second = (rescore(path, arcube_assumptions(), each, preset("default")) for each in ("gtsam", "bayes-filter"))
+    first, second = (rescored(path, each, preset("default")) for each in ("gtsam", "bayes-filter"))
     assert first == second
 
 
@@ -41,7 +48,7 @@ def test_what_the_robot_recorded_gives_the_scores_that_were_reported(preset_name
     """The test of the robot in ``worn`` has lost and undecided trials, too."""
     reported = json.loads((RECORDED.parent / f"table1_robonaut_worn_{preset_name}.json").read_text())["tests"][0]
     path = RECORDED / f"worn_{preset_name}" / "test-0000.jsonl.gz"
-    again = rescore(path, arcube_assumptions(), "bayes-filter", preset(preset_name))
+    again = rescored(path, "bayes-filter", preset(preset_name))
     assert list(again.identification) == reported["identification"]
     assert list(again.recognition) == reported["recognition"]
     assert (again.lost, again.undecided) == (reported["lost"], reported["undecided"])
@@ -50,7 +57,7 @@ def test_what_the_robot_recorded_gives_the_scores_that_were_reported(preset_name
 def test_learned_structure_is_no_worse_on_the_robots_evidence():
     path = RECORDED / "worn_default" / "test-0000.jsonl.gz"
     default, learned = (
-        rescore(path, arcube_assumptions(), engine, preset(name)).success[0]
+        rescored(path, engine, preset(name)).success[0]
         for engine, name in (("bayes-filter", "default"), ("learned-structure", "learned"))
     )
     assert learned >= default
@@ -63,5 +70,5 @@ def test_trials_of_other_objects_are_refused(tmp_path):
     lines[3]["actions"][0] = "jump"
     assert "jump" not in ACTION_SOURCES
     path.write_bytes(b"".join(gzip.compress(json.dumps(line).encode() + b"\n", mtime=0) for line in lines))
-    with pytest.raises(InvalidInputError, match=r"test-0000.*: trial 2: .*expected looks and actions of cubes"):
-        rescore(path, arcube_assumptions(), "bayes-filter", preset("default"))
+    with pytest.raises(InvalidInputError, match=r"test-0000.*: trial 2: look 0: action: .jump.; expected one of: flip"):
+        rescored(path, "bayes-filter", preset("default"))

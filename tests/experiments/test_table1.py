@@ -14,7 +14,7 @@ from atg_fg.experiments.figure3 import figure3_points
 from atg_fg.experiments.scores import TestResult, actions_a_trial, summarise
 from atg_fg.experiments.table1 import TestPlan, run_test, run_tests
 from atg_fg.storage.presets import preset
-from atg_fg.storage.trial_log import read_trials
+from atg_fg.storage.trial_log import read_log
 from atg_fg.worlds.finite_objects import FiniteObject, Mechanism, ObjectFamily
 from atg_fg.worlds.object_world import ObjectWorld
 
@@ -206,7 +206,7 @@ class TestSmoothedLearning:
 
     def test_it_fills_in_what_was_seen_in_part(self, tmp_path):
         run_test(self.PLAN, 1, tmp_path)
-        trials = read_trials(tmp_path / "test-0001.jsonl.gz")
+        trials = read_log(tmp_path / "test-0001.jsonl.gz")[1]
         filled = [trial for trial in trials if "learned" in trial]
         assert filled
         for trial in filled:
@@ -243,7 +243,7 @@ class TestSettled:
     def test_it_is_the_same_after_an_interruption(self, tmp_path):
         whole = run_test(self.PLAN, 1, tmp_path)
         assert run_test(self.PLAN, 1, tmp_path, True) == whole == run_test(self.PLAN, 1)
-        trials = read_trials(tmp_path / "test-0001.jsonl.gz")
+        trials = read_log(tmp_path / "test-0001.jsonl.gz")[1]
         assert tuple(len(trial["actions"]) for trial in trials) == whole.actions
         assert trials[0]["purpose"] == ["settled"]
 

@@ -9,10 +9,9 @@ from pathlib import Path
 
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
-from atg_fg.core.records import StoredTrial
 from atg_fg.storage.database.connection import open_to_read, translated
 from atg_fg.storage.database.memory_reading import holds_memory, read_memory_rows
-from atg_fg.storage.database.trial_rows import read_experiments, read_trials
+from atg_fg.storage.database.trial_rows import read_experiments, trials_or_faults
 
 #: Faults of one kind after which no more are looked for.
 MAX_FAULTS = 20
@@ -60,8 +59,8 @@ def _strange_records(connection: sqlite3.Connection, place: str, memory: RobotMe
     """Yield what trials that this memory learned from say that does not fit it."""
     names = {*memory.names, *(merge.dropped.name for merge in memory.merges)}
     n_slots, n_symbols = len(memory.assumptions.alphabet.slots), memory.assumptions.alphabet.n_symbols
-    for trial in read_trials(connection, place):
-        if trial.learned is None:
+    for _, trial in trials_or_faults(connection, place):
+        if isinstance(trial, InvalidInputError) or trial.learned is None:
             continue
         where = f"{place}: trial {trial.number} of experiment {trial.experiment}"
         if trial.learned not in names:
@@ -77,21 +76,11 @@ def _strange_records(connection: sqlite3.Connection, place: str, memory: RobotMe
 def _records(connection: sqlite3.Connection, place: str) -> Iterator[str]:
     experiments = list(read_experiments(connection, place))
     counts = dict.fromkeys((each.number for each in experiments), 0)
-    for trial in read_trials(connection, place):
-        if trial.experiment in counts:
+    for _, trial in trials_or_faults(connection, place):
+        if isinstance(trial, InvalidInputError):
+            yield str(trial)
+        elif trial.experiment in counts:
             expected = counts[trial.experiment]
             if trial.number != expected:
                 yield f"{place}: experiment {trial.experiment}: trial {trial.number}; expected {expected}"
             counts[trial.experiment] = trial.number + 1
-        yield from _trial_faults(trial, place)
-
-
-def _trial_faults(trial: StoredTrial, place: str) -> Iterator[str]:
-    where = f"{place}: trial {trial.number} of experiment {trial.experiment}"
-    for number, step in enumerate(trial.steps):
-        if not 0.0 <= step.unseen <= 1.0 + 1e-9 or not step.entropy >= -1e-9:
-            yield f"{where}: step {number}: unseen {step.unseen}, entropy {step.entropy}; expected a belief"
-    if (trial.verdict == "known") != (trial.matched is not None):
-        yield f"{where}: verdict {trial.verdict}, matched {trial.matched!r}; expected a match of what is known only"
-    if (trial.verdict == "lost") != (trial.lost_truth is not None):
-        yield f"{where}: verdict {trial.verdict}; expected the last truth of what is lost only"

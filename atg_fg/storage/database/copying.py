@@ -7,17 +7,18 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
-from atg_fg.core.errors import InvalidInputError
-from atg_fg.core.records import Experiment, StoredTrial
+from atg_fg.core.checks import whole_number
+from atg_fg.core.records import Experiment, TrialSummary
 from atg_fg.core.version import __version__
 from atg_fg.storage.database import trial_rows
 from atg_fg.storage.database.trial_log import TEST_KIND, read_stored_experiments, read_stored_trials
-from atg_fg.storage.trial_log import read_log
+from atg_fg.storage.recorded_test import read_header
+from atg_fg.storage.trial_log import from_line, read_log, to_line
 
 
 def records_in(
     path: Path | str, renamed: Mapping[str, str] | None = None
-) -> Iterator[tuple[Experiment | None, list[StoredTrial]]]:
+) -> Iterator[tuple[Experiment | None, list[TrialSummary]]]:
     """Yield the experiments in a database with their trials, and at last the trials that belong to none.
 
     Args:
@@ -35,22 +36,22 @@ def records_in(
         yield None, alone
 
 
-def records_in_log(path: Path) -> tuple[Experiment, list[StoredTrial]]:
+def records_in_log(path: Path) -> tuple[Experiment, list[TrialSummary]]:
     """Return the test in a log of trials (``….jsonl.gz``), and its trials.
 
     Raises:
         InvalidInputError: It cannot be read, or is not such a log.
     """
     header, lines = read_log(path)
-    seed = header.pop("seed", None)
-    if isinstance(seed, bool) or not isinstance(seed, int):
-        raise InvalidInputError(f"{path}: seed: {seed!r}; expected a whole number")
-    trials = [StoredTrial.of_line(line, f"{path}: trial {number}") for number, line in enumerate(lines)]
+    seed = whole_number(header.get("seed"), f"{path}: seed")
+    _, assumptions = read_header(header, str(path))
+    trials = [from_line(line, f"{path}: trial {number}", assumptions) for number, line in enumerate(lines)]
+    del header["seed"]
     return Experiment(TEST_KIND, header, seed, __version__), trials
 
 
 def add_records(
-    connection: sqlite3.Connection, records: Iterable[tuple[Experiment | None, list[StoredTrial]]]
+    connection: sqlite3.Connection, records: Iterable[tuple[Experiment | None, list[TrialSummary]]]
 ) -> tuple[int, int]:
     """Write experiments and trials, but for experiments that are there with the same trials. Inside of a transaction.
 
@@ -73,7 +74,7 @@ def add_records(
     return n_experiments, n_trials
 
 
-def _renamed(trial: StoredTrial, renamed: Mapping[str, str]) -> StoredTrial:
+def _renamed(trial: TrialSummary, renamed: Mapping[str, str]) -> TrialSummary:
     """Return a trial with the new names; the ATGs of one that this memory did not learn from are others."""
     if trial.learned is None:
         return trial
@@ -85,6 +86,6 @@ def _content(experiment: Experiment) -> tuple[str, str, int | None]:
     return experiment.kind, trial_rows.canonical(experiment.parameters), experiment.seed
 
 
-def _digest(trials: Iterable[StoredTrial]) -> str:
+def _digest(trials: Iterable[TrialSummary]) -> str:
     """Return a text that two experiments share only if their trials went the same way."""
-    return trial_rows.canonical([trial.line() for trial in trials])
+    return trial_rows.canonical([to_line(trial) for trial in trials])

@@ -10,7 +10,7 @@ from typing import Any
 
 from atg_fg.core.errors import AtgError, InvalidInputError
 from atg_fg.core.memory import RobotMemory
-from atg_fg.core.records import Experiment, StoredTrial, TrialRecord
+from atg_fg.core.records import Experiment, TrialRecord, TrialSummary
 from atg_fg.core.version import __version__
 from atg_fg.learning.structured_memory import StructuredMemory
 from atg_fg.storage.database import trial_rows
@@ -74,14 +74,14 @@ class DatabaseKeeper:
     def add_record(self, record: TrialRecord, learned: str | None) -> None:
         """Write the record of a trial, inside of a transaction."""
         with translated(self._place):
-            self._experiment = trial_rows.added(self._connection, self._experiment, StoredTrial.of(record, learned))
+            self._experiment = trial_rows.added(self._connection, self._experiment, TrialSummary.of(record, learned))
 
     def experiments(self) -> Iterator[Experiment]:
         """Yield the experiments in the file."""
         with translated(self._place):
             yield from trial_rows.read_experiments(self._connection, self._place)
 
-    def trials(self, experiment: int | None) -> Iterator[StoredTrial]:
+    def trials(self, experiment: int | None) -> Iterator[TrialSummary]:
         """Yield the trials in the file."""
         with translated(self._place):
             yield from trial_rows.read_trials(self._connection, self._place, experiment)

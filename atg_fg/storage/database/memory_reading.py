@@ -6,9 +6,10 @@ import sqlite3
 from pathlib import Path
 from typing import Any
 
+from atg_fg.core.checks import plain_text, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
-from atg_fg.storage.checked_json import parse_json, read_integer, read_object, read_text
+from atg_fg.storage.checked_json import parse_json, read_object
 from atg_fg.storage.database.connection import reading
 from atg_fg.storage.memory_json import MEMORY_FORMAT, memory_from_document
 
@@ -65,7 +66,7 @@ def _document(connection: sqlite3.Connection, place: str) -> dict[str, Any]:
     )
     graphs: dict[Any, dict[str, Any]] = {}
     for number, position, name in connection.execute("SELECT id, position, name FROM graphs ORDER BY position"):
-        read_integer(position, f"{place}: graphs[{len(graphs)}].position", least=0)
+        whole_number(position, f"{place}: graphs[{len(graphs)}].position", least=0)
         graphs[number] = {"name": name, "aspects": [], "transitions": []}
     _add_aspects(connection, graphs, place)
     _add_transitions(connection, graphs, actions, place)
@@ -92,7 +93,7 @@ def _add_aspects(connection: sqlite3.Connection, graphs: dict[Any, dict[str, Any
     for graph, number, symbols in connection.execute("SELECT graph, number, symbols FROM aspects ORDER BY 1, 2"):
         aspects = _of(graphs, graph, f"{place}: aspects")["aspects"]
         where = f"{place}: {graphs[graph]['name']!r}: aspects[{len(aspects)}]"
-        if read_integer(number, where, least=0) != len(aspects):
+        if whole_number(number, where, least=0) != len(aspects):
             raise InvalidInputError(f"{where}: number {number}; expected {len(aspects)}")
         aspects.append(_json(symbols, where))
 
@@ -104,7 +105,7 @@ def _add_transitions(
     for graph, source, action, target, count in rows:
         transitions = _of(graphs, graph, f"{place}: transitions")["transitions"]
         where = f"{place}: {graphs[graph]['name']!r}: transitions[{len(transitions)}].action"
-        if read_integer(action, where, least=0) >= len(actions):
+        if whole_number(action, where, least=0) >= len(actions):
             raise InvalidInputError(f"{where}: {action}; expected 0 to {len(actions) - 1}")
         transitions.append({"from": source, "action": actions[action], "to": target, "count": count})
 
@@ -118,7 +119,7 @@ def _structure(
         "SELECT number, graph, observed, actions FROM raw_trials ORDER BY number"
     ):
         where = f"{place}.trials[{len(trials)}]"
-        if read_integer(number, where, least=0) != len(trials):
+        if whole_number(number, where, least=0) != len(trials):
             raise InvalidInputError(f"{where}: number {number}; expected {len(trials)}")
         owner = _of(graphs, graph, where)["name"]
         trials.append({"object": owner, "observed": _json(observed, where), "actions": _json(actions, where)})
@@ -132,4 +133,4 @@ def _of(graphs: dict[Any, dict[str, Any]], graph: Any, place: str) -> dict[str, 
 
 
 def _json(text: Any, place: str) -> Any:
-    return parse_json(read_text(text, place), place)
+    return parse_json(plain_text(text, place), place)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from atg_fg.core.memory import RobotMemory
-from atg_fg.core.records import Experiment, StoredTrial
+from atg_fg.core.records import Experiment, TrialSummary
 from atg_fg.storage.database import trial_rows
 from atg_fg.storage.database.connection import writing
 from atg_fg.storage.database.memory_writing import replace_memory
@@ -14,7 +14,7 @@ from atg_fg.storage.database.memory_writing import replace_memory
 def save_database(
     memory: RobotMemory,
     path: Path | str,
-    trials: tuple[StoredTrial, ...] = (),
+    trials: tuple[TrialSummary, ...] = (),
     experiment: Experiment | None = None,
 ) -> None:
     """Save a memory in place of the one that a database holds, if any; its records of trials stay.

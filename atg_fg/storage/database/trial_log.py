@@ -10,12 +10,11 @@ from typing import Any, Final
 
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.core.records import Experiment, StoredTrial, TrialOutcome, TrialRecord
+from atg_fg.core.records import Experiment, TrialSummary
 from atg_fg.core.version import __version__
 from atg_fg.storage.checked_json import plain_json
 from atg_fg.storage.database import trial_rows
 from atg_fg.storage.database.connection import reading, writing
-from atg_fg.storage.trial_log import outcome_of
 
 #: The kind of experiment that a test of the paper is.
 TEST_KIND: Final = "test"
@@ -39,7 +38,7 @@ class DatabaseTrialLog:
         self._assumptions = assumptions
         self._experiment = _experiment_of(header)
 
-    def begin(self) -> list[TrialOutcome]:
+    def begin(self) -> list[TrialSummary]:
         """Write the experiment, and return its trials: none.
 
         Raises:
@@ -49,23 +48,19 @@ class DatabaseTrialLog:
             raise _already_there(self.path)
         return []
 
-    def resume(self) -> list[TrialOutcome]:
+    def resume(self) -> list[TrialSummary]:
         """Return the trials of this test that are in the database; begin it if it is not there.
 
         Raises:
             InvalidInputError: The database cannot be read or written.
         """
         self._open()
-        place = str(self.path)
-        trials = read_stored_trials(self.path, self._experiment.number)
-        return [outcome_of(trial.line(), self._assumptions, place) for trial in trials]
+        return list(read_stored_trials(self.path, self._experiment.number, self._assumptions))
 
-    def append(self, record: TrialRecord, outcome: TrialOutcome | None = None) -> None:
-        """Write a trial, and what is learned from it if that is not what was seen, as one transaction."""
-        seen = tuple(record.patterns)
-        patterns = None if outcome is None or outcome.patterns == seen else outcome.patterns
+    def append(self, trial: TrialSummary) -> None:
+        """Write a trial, as one transaction."""
         with writing(self.path, wait=_WAIT) as connection:
-            trial_rows.added(connection, self._experiment, StoredTrial.of(record, None, patterns))
+            trial_rows.added(connection, self._experiment, trial)
 
     def _open(self) -> bool:
         """Find the experiment, or write it; return whether it was there."""
@@ -102,14 +97,21 @@ def _already_there(path: Path) -> InvalidInputError:
     return InvalidInputError(f"{path}: has this test already; expected another database, or --resume to go on")
 
 
-def read_stored_trials(path: Path | str, experiment: int | None = None) -> Iterator[StoredTrial]:
+def read_stored_trials(
+    path: Path | str, experiment: int | None = None, assumptions: Assumptions | None = None
+) -> Iterator[TrialSummary]:
     """Yield the trials in a database, all or those of one experiment.
+
+    Args:
+        path: The database.
+        experiment: Number of the experiment; all if not given.
+        assumptions: Of the trials, as for ``trial_log.from_line``.
 
     Raises:
         InvalidInputError: The file cannot be read, or a trial in it is not as it should be.
     """
     with reading(path) as connection:
-        yield from trial_rows.read_trials(connection, str(path), experiment)
+        yield from trial_rows.read_trials(connection, str(path), experiment, assumptions)
 
 
 def read_stored_experiments(path: Path | str) -> list[Experiment]:

@@ -45,7 +45,7 @@ def test_a_sound_database_has_no_faults(path):
         ("UPDATE trials SET number = number + 7", "trial 7; expected 0"),
         ("DELETE FROM steps WHERE number = 0", "number 1; expected 0"),
         ("UPDATE steps SET action = 'jump' WHERE action = 'flip'", "does not fit the assumptions"),
-        ("UPDATE steps SET unseen = 2.0", "unseen 2.0"),
+        ("UPDATE steps SET unseen = 2.0", "unseen: 2.0; expected a finite number from 0 to 1"),
         ("UPDATE steps SET truth = '{'", "truth: not valid JSON"),
         ("UPDATE experiments SET parameters = '[]'", "parameters: []; expected an object"),
         ("UPDATE experiments SET seed = 'one'", "seed: 'one'; expected a whole number"),

@@ -1,0 +1,78 @@
+"""Values that come from users and files, checked: each function names the place of what is not as it should be."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Collection
+from typing import Any
+
+import numpy as np
+
+from atg_fg.core.errors import InvalidInputError
+
+
+def whole_number(value: Any, place: str, least: int = 0, most: int | None = None) -> int:
+    """Return ``value`` as an int, or raise ``InvalidInputError`` unless it is a whole number in these bounds."""
+    is_whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
+    if not is_whole or value < least or (most is not None and value > most):
+        bounds = f"of at least {least}" if most is None else f"from {least} to {most}"
+        raise InvalidInputError(f"{place}: {brief(value)}; expected a whole number {bounds}")
+    return int(value)
+
+
+def number(value: Any, place: str, least: float = -math.inf, most: float = math.inf, slack: float = 0.0) -> float:
+    """Return ``value`` as a float, or raise ``InvalidInputError`` unless it is a finite number in these bounds.
+
+    Args:
+        value: What is checked.
+        place: Named in the error.
+        least: Lower bound.
+        most: Upper bound.
+        slack: How far rounding may have carried it past a bound.
+    """
+    is_number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+    try:
+        found = float(value) if is_number else math.nan
+    except OverflowError:  # a whole number too large for a float
+        found = math.inf
+    if not math.isfinite(found) or not least - slack <= found <= most + slack:
+        bounds = f" from {least:g} to {most:g}" if most < math.inf else f" of at least {least:g}" * (least > -math.inf)
+        raise InvalidInputError(f"{place}: {brief(value)}; expected a finite number{bounds}")
+    return found
+
+
+def one_of(value: Any, place: str, known: Collection[str]) -> str:
+    """Return ``value``, or raise ``InvalidInputError`` unless it is one of the texts ``known``."""
+    if not isinstance(value, str) or value not in known:
+        raise InvalidInputError(f"{place}: {brief(value)}; expected one of: {', '.join(known)}")
+    return value
+
+
+def plain_text(value: Any, place: str) -> str:
+    """Return ``value``, or raise ``InvalidInputError`` unless it is a text of whole characters, and not empty."""
+    if not isinstance(value, str) or not value:
+        raise InvalidInputError(f"{place}: {brief(value)}; expected a text that is not empty")
+    try:
+        value.encode()
+    except UnicodeError as error:  # JSON can say half a character
+        raise InvalidInputError(f"{place}: {brief(value)}; expected a text of whole characters") from error
+    return value
+
+
+def names(value: Any, place: str) -> tuple[str, ...]:
+    """Return ``value`` as a tuple, or raise ``InvalidInputError`` unless it is a list of texts, all different."""
+    if not isinstance(value, (list, tuple)):
+        raise InvalidInputError(f"{place}: {brief(value)}; expected a list of names")
+    found = tuple(plain_text(name, f"{place}[{index}]") for index, name in enumerate(value))
+    if len(set(found)) < len(found):
+        raise InvalidInputError(f"{place}: {brief(value)}; expected names that are all different")
+    return found
+
+
+def brief(value: Any) -> str:
+    """Return what a value is, in at most 60 characters of ASCII if it has half characters."""
+    try:
+        told = repr(value)
+    except (ValueError, RecursionError):  # a number of thousands of digits, or lists in lists without end
+        told = f"a {type(value).__name__} too long to be shown"
+    return told if len(told) <= 60 else told[:57] + "..."
