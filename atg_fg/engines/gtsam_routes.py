@@ -1,7 +1,7 @@
 """GTSAM's own ways to marginals: a Bayes net, a Bayes tree, and ``DiscreteMarginals``.
 
 Each question after a step makes the factor graph of the whole trial anew and eliminates it, in an ordering that can be
-chosen. What an ordering costs is the size of the largest table on the way, ``elimination_cost``.
+chosen. The cost of an ordering is the size of the largest table that it makes, ``elimination_cost``.
 """
 
 from __future__ import annotations
@@ -63,7 +63,7 @@ def elimination_cost(graph: RecognitionGraph, order: Iterable[int]) -> int:
 
 
 class GtsamRoute(WholeTrialInference):
-    """What the routes share; each says how it gets the marginals of a graph.
+    """What the routes share; a subclass says how it gets the marginals of a graph.
 
     GTSAM multiplies plain numbers, so in a long trial an object's weight can underflow. Where the whole graph leaves an
     object the weight zero, identity comes from each object's graph alone (``RecognitionGraph``), and its aspects from

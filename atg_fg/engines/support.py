@@ -1,4 +1,4 @@
-"""What is possible at all, for engines whose own numbers do not tell the impossible from the improbable."""
+"""The support of the belief, for engines whose own numbers do not tell the impossible from the improbable."""
 
 from __future__ import annotations
 

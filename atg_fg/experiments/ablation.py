@@ -115,8 +115,8 @@ def run_ablation(
         on_test: Called after each test that is run.
         executor: As for ``run_tests``.
     """
-    # Seed by seed, so that what is cut off has as many tests in each cell; within a seed the longest first, so that no
-    # processor is at work alone at the end: each variant does what the one before it does, and more.
+    # The tests run seed by seed: a run that is cut off has equally many tests in each cell. Within a seed the longest
+    # tests come first, so that no processor works alone at the end. Each variant does more than the one before it.
     variants = list(VARIANTS)
     longest_first = sorted(cells, key=lambda cell: (-variants.index(cell.variant), -cell.actions))
     tests = [(cell, seed) for seed in sorted(seeds) for cell in longest_first]

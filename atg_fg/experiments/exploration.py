@@ -47,7 +47,7 @@ def learned_memory(
     memory = memory_for(parameters, RobotMemory(assumptions))
     with closing(make_world(world, cubes=cubes)) as made_world:
         for number in range(len(cubes)):
-            # An empty memory, since what else is remembered is of no interest while a new object is explored.
+            # The memory is empty: what else the robot remembers does not matter while it explores a new object.
             inference = begin_trial("bayes-filter", RobotMemory(assumptions), _PLAIN)
             record = run_trial(made_world, inference, policy, n_actions, rng, reset_options={"object": number})
             name = memory.learn(record.patterns, record.actions, matched=None)

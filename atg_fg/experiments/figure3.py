@@ -69,7 +69,7 @@ def figure3_points(
         executor: As for ``run_tests``.
     """
     points = [Point(number, policy) for number in actions for policy in policies]
-    # The longest first, so that no processor is at work alone at the end.
+    # The longest tests come first, so that no processor works alone at the end.
     tests = [(point, seed) for point in sorted(points, key=lambda point: -point.actions) for seed in seeds]
 
     def plan_of(point: Point) -> TestPlan:

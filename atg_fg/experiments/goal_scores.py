@@ -72,7 +72,7 @@ def score(
         reached: Whether the robot says that the goal is shown at the end.
         memory: That the trial began with; its ATGs are of the world's objects, in their order.
         cube: The object, by the truth.
-        learn_in_trial: Whether the robot could use, besides its memory, what the trial itself had shown.
+        learn_in_trial: Whether the robot may plan with the transitions that the trial itself has shown.
     """
     purposes = [step.purpose for step in record.steps]
     decided = next(

@@ -144,7 +144,7 @@ def run_goals(
         for station, (number, station_seed) in enumerate(zip(objects, station_seeds, strict=True)):
             wanted = shown_pattern(cubes[number], int(setup.integers(len(ORIENTATIONS))))
             goal_policy = GoalPolicy(Goal(assumptions.alphabet, wanted), plan.planner, plan.unreachable, plan.settled)
-            # The objects are different ones: what is known of those served says what this one is not.
+            # All objects are different: this one is none of those that were served before.
             prior = identity_given_others(memory_prior, beliefs)
             inference = begin_trial(plan.engine, memory, plan.parameters, prior=prior)
             record = run_trial(
@@ -214,7 +214,7 @@ def _run_path(records: Path, number: int) -> Path:
 
 
 def _run_and_save(plan: GoalPlan, seed: int, records: Path | None, number: int) -> tuple[ServedObject, ...]:
-    """Run once; a run that is saved already, perhaps by a worker that died right after, is only read."""
+    """Run once. A run that is saved already is only read: a worker may have died right after it saved the run."""
     if records is None:
         return run_goals(plan, run_seed(seed, number)).served
     file = GoalRunFile(_run_path(records, number), {"seed": seed, "run": number, **unusual(plan)})

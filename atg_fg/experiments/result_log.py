@@ -1,4 +1,4 @@
-"""Results of many tests in a file that grows test by test, and is sound whenever it is cut off."""
+"""Results of many tests in a file that grows test by test, and stays readable wherever it is cut off."""
 
 from __future__ import annotations
 

@@ -196,7 +196,7 @@ def run_tests(
         records = records.resolve() if goes_to_database(records) else make_folder(records).resolve()
         for plan, seed in plans if not resume else ():
             _check_not_begun(plan, seed, records)
-    # Always to be gone on with from here, for a worker that dies leaves part of a test to the next one.
+    # A worker always resumes: a worker that died has left a part of the test to it.
     resolved = None if memories is None else memories.resolve()
     run = partial(_run_one_of, records=records, memories=resolved)
     return run_pieces(run, plans, executor, jobs, on_result)

@@ -1,4 +1,4 @@
-"""Several objects at once: what is believed of each, given that they are all different.
+"""Beliefs about several objects that are all different.
 
 The belief in each object is that from its own evidence. All of them together are the product of these beliefs and one
 factor on (O_1, …, O_n): zero if two of them are the same remembered object, and U (U − 1) … (U − m + 1) / U^m if m of

@@ -26,7 +26,7 @@ class BeliefComponent(NamedTuple):
         hypothesis: State of O.
         probability: p(hypothesis | z_0:t, a_1:t), or a part of it where there is more than one way to be that object.
         graph: The transitions that are known of it.
-        belief: p(aspect | hypothesis, z_0:t, a_1:t) of nodes; what is lacking to one is nowhere in the graph.
+        belief: p(aspect | hypothesis, z_0:t, a_1:t) of nodes; the rest, up to one, is on no node of the graph.
     """
 
     hypothesis: int
@@ -62,7 +62,7 @@ def shown_patterns_of(model: RecognitionModel, belief: FloatArray, evidence: Evi
     """
     known = model.pattern_of >= 0
     shown = np.bincount(model.pattern_of[known], belief[known], model.n_patterns).astype(np.float64)
-    # In a collection node it is a pattern that the object was not known to show, as far as the evidence agrees.
+    # An aspect in the collection node shows a pattern that the object is not known to show; the evidence weighs these.
     noise = model.parameters.observation_noise
     agrees = (1.0 - noise) * evidence.likelihood + noise * evidence.likelihood.mean()
     unknown = model.lacks @ agrees

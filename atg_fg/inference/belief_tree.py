@@ -27,7 +27,7 @@ _NEGLIGIBLE: Final = 1e-18
 
 
 class BeliefNode(Protocol):
-    """A belief over identity and present aspect that may come of a trial; nothing is learned any more."""
+    """A belief over identity and present aspect that a trial may lead to; nothing more is learned on the way."""
 
     def expected_entropies(self) -> FloatArray:
         """Return the expected entropy of identity after one more action (eq. 3) in nats, shape [A]."""
@@ -37,7 +37,7 @@ class BeliefNode(Protocol):
 
 
 class Observations(Protocol):
-    """The looks that an action may lead to; patterns that leave one and the same belief may be one of them."""
+    """The looks that an action may lead to; patterns that lead to the same belief may count as one look."""
 
     @property
     def probabilities(self) -> FloatArray:
@@ -152,7 +152,7 @@ class TableObservations:
         """Return the mass, with each look, that the next action's counted edges carry to each target, [N, R]."""
         model, edges = self._model, self._model.edges
         arrived: FloatArray = self._share[looks][:, None] * arrivals(model, self._shared)
-        # A look's own mass is where its pattern is shown: it takes only the edges that leave that aspect.
+        # A look's own mass is on the aspect that shows its pattern: only edges that leave this aspect carry it.
         position = np.full(len(self._share), -1)
         position[looks] = np.arange(len(looks))
         look = self._look_of[model.pattern_of[edges.hypothesis, edges.source]]

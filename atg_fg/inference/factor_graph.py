@@ -101,7 +101,7 @@ class RecognitionGraph:
         Raises:
             ImpossibleEvidenceError: The evidence has probability zero.
         """
-        # O last: its factor would couple all aspect variables, and grow with every step.
+        # O is eliminated last: earlier it would couple all aspect variables, in a table that grows with every step.
         order = factors.ordering([*map(self.aspect_key, range(self.last + 1)), self.object_key])
         try:
             return self.graph.sumProduct(order)
@@ -168,7 +168,7 @@ class RecognitionGraph:
         """
         if not 0 <= time <= self.last:
             raise InvalidInputError(f"time: {time!r}; expected 0 to {self.last}")
-        # Inwards from both ends of the chain: no elimination couples more than O and two aspects.
+        # The order goes inwards from both ends of the chain, so no table holds more than O and two aspects.
         inwards = [*range(time), *range(self.last, time, -1)]
         sizes = {self.object_key: len(self.chain.prior), self.aspect_key(time): self.chain.widths[time]}
         try:
@@ -178,7 +178,7 @@ class RecognitionGraph:
             raise impossible() from error
         by_object = joint.sum(axis=1)
         if len(by_object) > 1 and not by_object.all():
-            # As in ``identity``: a zero may be a number too small, so each object is asked alone.
+            # As in ``identity``, a zero may be a number that is too small; so each object is asked alone.
             weights = self.identity().probabilities
             possible = np.flatnonzero(weights)
             joint = np.zeros_like(joint)

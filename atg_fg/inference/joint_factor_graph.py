@@ -74,7 +74,7 @@ class JointRecognitionGraph:
             ImpossibleEvidenceError: The evidence of an object, or of all of them together, has probability zero.
         """
         alone = [trial.identity() for trial in self.trials]
-        # Where each object is next to surely the same one, what is left may be less than GTSAM's numbers hold.
+        # If all objects are almost certainly the same one, the other assignments may be too small for GTSAM's numbers.
         least = sum(float(log_of(belief.probabilities).min()) for belief in alone)
         marginals = self._marginals_by_elimination() if least > _LEAST_LOG_PRODUCT else self._marginals_of_logarithms()
         return [IdentityBelief.of(marginal, self.n_unseen) for marginal in marginals]

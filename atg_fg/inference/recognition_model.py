@@ -64,7 +64,7 @@ class Revelation(NamedTuple):
 
 
 class RecognitionModel:
-    """The tables in force at one time of one trial; ``learn`` makes them those of the next.
+    """The tables in force at one time of a trial; ``learn`` turns them into those of the next time.
 
     H = K + 1 hypotheses, W states (padded), A actions, |𝒵| patterns, E edge entries.
 
@@ -103,7 +103,7 @@ class RecognitionModel:
         self._refresh_transitions()
 
     def _set_sizes(self, memory: RobotMemory, parameters: ModelParameters, prior: IdentityBelief | None) -> None:
-        """Set all that asks for no table over objects and patterns."""
+        """Set everything that needs no table over objects and patterns."""
         self.memory = memory
         self.parameters = parameters
         self.n_actions = len(memory.assumptions.actions)

@@ -1,4 +1,4 @@
-"""What a trial shows in the light of all its evidence: patterns that a look saw in part, or wrongly, filled in.
+"""Patterns that a look saw in part or wrongly, completed from all evidence of the trial.
 
 A memory update from raw patterns skips a look that missed a symbol, and both transitions about it. Given the object,
 the looks before and after it often leave one pattern only.

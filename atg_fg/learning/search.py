@@ -74,7 +74,7 @@ def propose_structures(
 ) -> Proposals:
     """Return the best structure that each chain met.
 
-    One with an irreversible action is proposed only if it is better than all permutations by the quick score.
+    A structure with an irreversible action is proposed only if its quick score beats that of every permutation.
 
     Args:
         trials: Raw trials; with none there is nothing to propose.

@@ -15,14 +15,14 @@ from atg_fg.policies.belief_features import BeliefFeatures
 
 
 class Agent(Protocol):
-    """What a model of Stable-Baselines3 can do, as far as it is needed here."""
+    """The part of a model of Stable-Baselines3 that is needed here."""
 
     def predict(self, observation: Any, *, deterministic: bool) -> tuple[Any, Any]:
         """Return the action for an observation, and a state, which is ``None`` of an agent without one."""
 
 
 class AgentPolicy:
-    """Lets an agent choose, by a summary of the belief; always the action that it thinks best.
+    """Lets an agent choose, by the features of the belief; it always takes the action that the agent thinks best.
 
     Args:
         agent: Anything with ``predict(observation, deterministic=True)``, such as a model of Stable-Baselines3 that

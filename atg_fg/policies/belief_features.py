@@ -1,4 +1,4 @@
-"""A belief in few numbers: what an agent from a library of reinforcement learning sees of a trial."""
+"""A belief as few numbers: the observation of an agent from a library of reinforcement learning."""
 
 from __future__ import annotations
 
@@ -82,13 +82,13 @@ class BeliefFeatures:
         plain = [belief.unseen, belief.entropy / most, 1 / len(inference.history.evidence)]
         gains = self._gains(inference, belief.entropy)
         entries: FloatArray = np.concatenate([best, plain, gains, self._symbols(inference)])
-        # A memory that holds more objects than there are said to be can be less certain than ln |O|.
+        # The entropy can exceed ln |O| if the memory holds more objects than the assumptions say there are.
         return entries.clip(0.0, 1.0).astype(np.float32)
 
     def _gains(self, inference: Inference, entropy: float) -> FloatArray:
         """Return the entropy that each action is expected to take away, as a share of what the best one is, shape [A].
 
-        Shares, since actions differ by little compared with ln |O|: a network would have to learn to look closely.
+        Shares are given because gains are small compared with ln |O|; a network learns little from small differences.
         """
         if not self.expected_entropies:
             return np.empty(0)

@@ -13,7 +13,7 @@ from atg_fg.policies.shortest_paths import exploration_costs
 
 
 class ExplorationPolicy:
-    """Tries what was never tried: goes to the nearest aspect with such an action, on what is believed of the object."""
+    """Goes to the nearest aspect with an action that was never tried there, as far as it is known, and tries it."""
 
     name: ClassVar[str] = "explore"
 

@@ -74,11 +74,11 @@ PLANNERS: Final[dict[str, Callable[[], Planner]]] = {
 
 
 class GoalPolicy:
-    """Recognises until the identity is settled, then goes the way of least expected cost, looking after each action.
+    """Recognises until the identity is settled, then takes the action of least expected cost after each look.
 
-    Nothing is kept from one look to the next but the inference's own belief: a slip is replanned from, and a belief
-    that falls apart makes it recognise again. The policy ends the trial when the goal is shown, and when it cannot be
-    reached.
+    The policy keeps nothing from one look to the next but the belief of the inference. So it plans anew after a slip,
+    and it recognises again when the belief becomes uncertain. The policy ends the trial when the goal is shown, and
+    when it cannot be reached.
 
     Args:
         goal: What the object is to show.

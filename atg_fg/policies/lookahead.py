@@ -19,11 +19,11 @@ _WEIGHTS: Final = (1e-2, 1e-4, 1e-6, 1e-8)
 
 
 class Bounds(NamedTuple):
-    """What the expected entropy after several actions is at least and at most, by the first of them.
+    """The least and the most that the expected entropy after several actions can be, by the first action.
 
     Attributes:
         low: Nats, shape [A].
-        high: Nats, shape [A]; what a plan attains that was looked at, so always a value that can be had.
+        high: Nats, shape [A]; some plan that was examined attains this value.
     """
 
     low: FloatArray
@@ -71,9 +71,9 @@ class LookaheadPolicy:
         return Choice(one_of_the_best(expected, rng), expected)
 
     def bounds(self, inference: Inference) -> Bounds:
-        """Return what the expected entropy after ``horizon`` actions is by the first one, at least and at most.
+        """Return the least and the most that the expected entropy after ``horizon`` actions can be, by first action.
 
-        No more looks are followed than the decision needs: the two are the same, up to rounding, if it needs all.
+        Looks are followed until the decision is certain. If all have to be followed, the two agree up to rounding.
         """
         weights = [*(weight for weight in _WEIGHTS if weight > self.least_weight), self.least_weight]
         return bounds_ahead(inference.belief_tree(), self.horizon, weights)
@@ -144,7 +144,7 @@ class _Branch:
                 self._low[chosen] = self._high[chosen] = self._one_ahead(chosen)
                 self._weights[chosen] = 0.0
             return
-        # Those that weigh most come first, so that an action that cannot win is given up early.
+        # Looks with the greatest weight come first: so an action that cannot win is given up early.
         for look in chosen[np.argsort(-self._weights[chosen], kind="stable")]:
             if self.low > enough:
                 return

@@ -65,7 +65,7 @@ def make_world_with(name: str, n_objects: int, seed: int, **options: Any) -> Wor
 
 
 def assumptions_of(world: World, n_objects: int) -> Assumptions:
-    """Return what the robot shall take for granted in a world: what its attribute ``assumptions`` says, if it has one.
+    """Return what the robot takes for granted in a world: the world's attribute ``assumptions``, if it has one.
 
     A world without one is of ``n_objects`` ARcubes.
 

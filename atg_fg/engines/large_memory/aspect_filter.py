@@ -1,8 +1,8 @@
 """The Bayes filter of many hypotheses, each over its own aspects: rows of padded arrays, and lists of counted edges.
 
 It computes what ``atg_fg.inference.recognition_model`` says, without any table over objects and patterns. A row may
-also have *hidden* aspects: known ones that are told from each other by nothing that the trial has shown. Their mass is
-kept as one number, and what is not known of their edges is between the two extremes that the row is given
+also have *hidden* aspects: known aspects that nothing in the trial has told apart yet. Their mass is kept as one
+number. What is not known of their edges lies between the two extremes that the row is given
 (``docs/large_memories.md``).
 """
 

@@ -27,7 +27,7 @@ _ROUNDING: Final = 1e-15
 
 
 class NextLooks(NamedTuple):
-    """What is to be seen after each action, from J = p(O = i, z | a), summed over some objects.
+    """What may be seen after each action, from J = p(O = i, z | a), summed over some objects.
 
     Attributes:
         predictive: Σ_i J, shape [A, |𝒵|].
@@ -55,7 +55,7 @@ def expected_entropies(parts: Sequence[NextLooks], unseen: float, n_unseen: int)
 
 
 class _Followed(NamedTuple):
-    """Where mass is that is followed along its edges.
+    """The states whose counted edges are followed.
 
     Attributes:
         cells: The states, as row · W + state, shape [F].

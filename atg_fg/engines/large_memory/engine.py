@@ -148,7 +148,7 @@ class LargeMemory(Inference):
             each.predict(action)
 
     def _masses(self) -> ClassMasses:
-        """Return what one of the other objects weighs, on the scale on which all weights sum to one."""
+        """Return the weights of one object of each class, on the scale on which all weights sum to one."""
         assert self._classes is not None
         return self._classes.masses(self._log_total)
 

@@ -1,4 +1,4 @@
-"""The model's tables where they are asked for, and not before: for a large memory they are larger still."""
+"""The model's tables, made when they are first asked for: those of a large memory are too large to make at once."""
 
 from __future__ import annotations
 

@@ -30,7 +30,7 @@ class Workers(Protocol):
 
     Attributes:
         slots: How many pieces may be there at once.
-        attempts: How many times a piece is begun before its workers' deaths are taken for its own fault.
+        attempts: How many times a piece is begun; after that its workers' deaths count as its own fault.
     """
 
     slots: int
@@ -106,7 +106,7 @@ def _run_on(
     running: dict[Future[Result], int] = {}
     losses: Counter[int] = Counter()
     while waiting or running:
-        # Only what can run at once is handed over, so that a lost worker tells which piece it was at.
+        # Only as many pieces as can run at once are handed over: a lost worker then tells which piece it had.
         while waiting and len(running) < workers.slots:
             number = waiting.popleft()
             running[workers.submit(function, pieces[number])] = number
@@ -143,7 +143,7 @@ def check_executor(executor: str, name: str = "executor") -> None:
 
 
 def stop_if_asked() -> None:
-    """Leave a piece that nobody waits for any more, by ``SystemExit``: for long pieces, to call now and then.
+    """Raise ``SystemExit`` in a piece that nobody waits for any more; long pieces call this now and then.
 
     A process is ended from outside, but a thread has to leave by itself.
     """

@@ -31,7 +31,7 @@ class Cluster:
     """
 
     attempts = 1
-    # All pieces: a scheduler hands them out in their order, to workers that come later, too.
+    # The scheduler takes all pieces at once. It hands them out in order, also to workers that join later.
     slots = sys.maxsize
 
     def __init__(self, address: str) -> None:
@@ -39,7 +39,8 @@ class Cluster:
         self._address = address
         self._killed: type[Exception] = distributed.KilledWorker
         url = address.replace("dask://", "tcp://")
-        # First, since a client that finds no scheduler does not end cleanly; in a thread, since a notebook has a loop.
+        # This is checked first: a client that finds no scheduler does not end cleanly. A thread runs the check, for a
+        # notebook has an event loop of its own.
         with ThreadPoolExecutor(1) as pool:
             pool.submit(asyncio.run, _check_scheduler(distributed, address, url)).result()
         self._client = distributed.Client(url, timeout=PATIENCE, set_as_default=False)
@@ -94,7 +95,7 @@ class Cluster:
             ) from error
 
     def close(self) -> None:
-        """Leave the cluster; pieces that were not begun are given up, others end there with nobody to tell."""
+        """Leave the cluster. Pieces that have not begun are given up; the results of the others are lost."""
         self._client.close()
         self._log.setLevel(self._level)
 

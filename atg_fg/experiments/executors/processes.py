@@ -49,7 +49,7 @@ class WorkerProcesses:
         return self._begin(_Worker(), function, piece)
 
     def _begin(self, worker: _Worker, function: Callable[[Any], Any], piece: Any) -> Future[Any]:
-        # An interruption waits until the worker is on the list of those that are ended after it.
+        # An interruption waits until the worker is in the list: all workers in the list are ended after it.
         with _start_of_process():
             future = worker.pool.submit(function, piece)
             self._busy[future] = worker
@@ -95,7 +95,7 @@ class _Worker:
 
 
 class _RecordingContext(SpawnContext):
-    """Knows the processes that a pool has made of it; the pool itself does not tell."""
+    """Keeps the processes that a pool makes with it; the pool itself does not give them out."""
 
     def __init__(self) -> None:
         super().__init__()

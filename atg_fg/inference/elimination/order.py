@@ -1,4 +1,4 @@
-"""In which order to sum variables out of a factor graph, and how large the tables then get."""
+"""An order in which to sum variables out of a factor graph, and the sizes of the tables that it makes."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ class EntryBudget(NamedTuple):
 
 
 def best_order(scopes: Sequence[Sequence[int]], sizes: Sequence[int], budget: EntryBudget) -> EliminationOrder:
-    """Return the cheaper of two orders: that which adds fewest edges at each step, and that of the variables' numbers.
+    """Return the cheaper of two orders: one that adds the fewest edges at each step, and the order of the numbers.
 
     The first is good on most graphs; in a chain or a grid that is numbered along its rows the second is hard to beat.
 
