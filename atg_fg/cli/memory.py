@@ -19,6 +19,7 @@ from atg_fg.storage.compact_file import is_compact
 from atg_fg.storage.database.checking import faults_of_database
 from atg_fg.storage.database.connection import is_database
 from atg_fg.storage.database.memory_reading import database_holds_memory
+from atg_fg.storage.database.repairing import repair_database
 from atg_fg.storage.database.trial_log import read_stored_experiments, read_stored_trials
 from atg_fg.storage.example import example_memory
 from atg_fg.storage.memory_files import load_memory
@@ -126,6 +127,24 @@ def check(file: options.MemoryFile, json_file: options.JsonFile = None) -> int:
         for line in faults or [f"{file}: sound, {sound['objects']} ATGs"]:
             typer.echo(line)
     return 1 if faults else 0
+
+
+@app.command()
+def repair(
+    file: Annotated[Path, typer.Argument(help="A database.", show_default=False)], json_file: options.JsonFile = None
+) -> None:
+    """Take trials that cannot be read out of a database, and put on record there what they were.
+
+    All trials of a test after a bad one follow from it, and are taken out, too; table1 --resume runs them again.
+
+    Example: atg-fg memory repair robot.db
+    """
+    options.check_json_option(json_file)
+    faults = repair_database(file)
+    options.write_json({"command": "memory repair", "faults": faults}, json_file)
+    if json_file != "-":
+        for line in faults or [f"{file}: no record in it is bad"]:
+            typer.echo(line)
 
 
 def _holds_memory(file: Path) -> bool:

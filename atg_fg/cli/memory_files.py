@@ -119,7 +119,7 @@ def _import(files: list[Path], into: Path) -> None:
             raise InvalidInputError(f"{into}: more than one memory; expected one, or atg-fg memory merge first")
         for memory in full:
             replace_memory(connection, memory)
-        added = [add_records(connection, each) for each in records]
+        added = [add_records(connection, str(into), each) for each in records]
     n_objects = sum(map(len, full))
     n_experiments, n_trials = (sum(counts[kind] for counts in added) for kind in (0, 1))
     typer.echo(f"{into}: {n_objects} ATGs, {n_experiments} experiments and {n_trials} trials imported")
@@ -179,7 +179,7 @@ def _save_with_records(memory: RobotMemory, output: Path, first: Path, second: P
     with writing(output, create=True) as connection:
         for file, names in ((first, {}), (second, renamed)):
             if is_database(file):
-                n_trials += add_records(connection, records_in(file, names))[1]
+                n_trials += add_records(connection, str(output), records_in(file, names))[1]
         replace_memory(connection, memory)
     return n_trials
 

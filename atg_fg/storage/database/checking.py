@@ -7,11 +7,14 @@ from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
 
+from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.storage.database.connection import open_to_read, translated
 from atg_fg.storage.database.memory_reading import holds_memory, read_memory_rows
-from atg_fg.storage.database.trial_rows import read_experiments, trials_or_faults
+from atg_fg.storage.database.trial_log import TEST_KIND
+from atg_fg.storage.database.trial_rows import experiments_or_faults, trials_or_faults
+from atg_fg.storage.recorded_test import read_header
 
 #: Faults of one kind after which no more are looked for.
 MAX_FAULTS = 20
@@ -59,7 +62,7 @@ def _strange_records(connection: sqlite3.Connection, place: str, memory: RobotMe
     """Yield what trials that this memory learned from say that does not fit it."""
     names = {*memory.names, *(merge.dropped.name for merge in memory.merges)}
     n_slots, n_symbols = len(memory.assumptions.alphabet.slots), memory.assumptions.alphabet.n_symbols
-    for _, trial in trials_or_faults(connection, place):
+    for _, trial in trials_or_faults(connection, place, {}):
         if isinstance(trial, InvalidInputError) or trial.learned is None:
             continue
         where = f"{place}: trial {trial.number} of experiment {trial.experiment}"
@@ -74,13 +77,33 @@ def _strange_records(connection: sqlite3.Connection, place: str, memory: RobotMe
 
 
 def _records(connection: sqlite3.Connection, place: str) -> Iterator[str]:
-    experiments = list(read_experiments(connection, place))
-    counts = dict.fromkeys((each.number for each in experiments), 0)
-    for _, trial in trials_or_faults(connection, place):
+    assumptions, faults = assumptions_of_tests(connection, place)
+    yield from faults.values()
+    following = dict.fromkeys(assumptions, 0)
+    for _, trial in trials_or_faults(connection, place, assumptions):
         if isinstance(trial, InvalidInputError):
             yield str(trial)
-        elif trial.experiment in counts:
-            expected = counts[trial.experiment]
-            if trial.number != expected:
+        elif trial.experiment in following:
+            if trial.number != following[trial.experiment]:
+                expected = following[trial.experiment]
                 yield f"{place}: experiment {trial.experiment}: trial {trial.number}; expected {expected}"
-            counts[trial.experiment] = trial.number + 1
+            following[trial.experiment] = trial.number + 1
+
+
+def assumptions_of_tests(
+    connection: sqlite3.Connection, place: str
+) -> tuple[dict[int | None, Assumptions | None], dict[int, str]]:
+    """Return by number what was taken for granted in each experiment, where it is known, and what is wrong with one."""
+    assumptions: dict[int | None, Assumptions | None] = {}
+    faults: dict[int, str] = {}
+    for number, found in experiments_or_faults(connection, place):
+        try:
+            if isinstance(found, InvalidInputError):
+                raise found
+            assumptions[number] = None
+            if found.kind == TEST_KIND:
+                header = {"seed": found.seed, **found.parameters}
+                assumptions[number] = read_header(header, f"{place}: experiment {number}")[1]
+        except InvalidInputError as error:
+            faults[number] = str(error)
+    return assumptions, faults

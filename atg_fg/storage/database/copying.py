@@ -8,9 +8,11 @@ from dataclasses import replace
 from pathlib import Path
 
 from atg_fg.core.checks import whole_number
+from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.records import Experiment, TrialSummary
 from atg_fg.core.version import __version__
 from atg_fg.storage.database import trial_rows
+from atg_fg.storage.database.checking import assumptions_of_tests
 from atg_fg.storage.database.trial_log import TEST_KIND, read_stored_experiments, read_stored_trials
 from atg_fg.storage.recorded_test import read_header
 from atg_fg.storage.trial_log import from_line, read_log, to_line
@@ -51,16 +53,24 @@ def records_in_log(path: Path) -> tuple[Experiment, list[TrialSummary]]:
 
 
 def add_records(
-    connection: sqlite3.Connection, records: Iterable[tuple[Experiment | None, list[TrialSummary]]]
+    connection: sqlite3.Connection, place: str, records: Iterable[tuple[Experiment | None, list[TrialSummary]]]
 ) -> tuple[int, int]:
     """Write experiments and trials, but for experiments that are there with the same trials. Inside of a transaction.
 
+    Args:
+        connection: To the database.
+        place: For error messages.
+        records: As ``records_in`` and ``records_in_log`` return them.
+
     Returns:
         How many experiments and trials were written.
+
+    Raises:
+        InvalidInputError: A record in the database is not as it should be, afterwards.
     """
     there = {
-        (_content(each), _digest(trial_rows.read_trials(connection, "records", each.number)))
-        for each in list(trial_rows.read_experiments(connection, "records"))
+        (_content(each), _digest(trial_rows.read_trials(connection, place, each.number)))
+        for each in list(trial_rows.read_experiments(connection, place))
     }
     n_experiments = n_trials = 0
     for experiment, trials in records:
@@ -71,6 +81,11 @@ def add_records(
         for trial in trials:
             trial_rows.add_trial(connection, trial, number)
             n_trials += 1
+    # What is in the database from here on must be readable: another program may have written the records.
+    assumptions, unsound = assumptions_of_tests(connection, place)
+    trials_there = trial_rows.trials_or_faults(connection, place, assumptions)
+    for fault in (*unsound.values(), *(found for _, found in trials_there if isinstance(found, InvalidInputError))):
+        raise InvalidInputError(f"{fault}; nothing was imported")
     return n_experiments, n_trials
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import sqlite3
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Final
 
@@ -87,15 +87,31 @@ def read_experiments(connection: sqlite3.Connection, place: str) -> Iterator[Exp
     Raises:
         InvalidInputError: One that is not as it should be; the message names ``place``.
     """
-    for number, kind, seed, parameters, version in connection.execute(
-        "SELECT id, kind, seed, parameters, version FROM experiments ORDER BY id"
-    ):
+    for _, found in experiments_or_faults(connection, place):
+        if isinstance(found, InvalidInputError):
+            raise found
+        yield found
+
+
+def experiments_or_faults(
+    connection: sqlite3.Connection, place: str
+) -> Iterator[tuple[int, Experiment | InvalidInputError]]:
+    """Yield the number of each experiment, with the experiment, or with what is wrong with it."""
+    for (number,) in connection.execute("SELECT id FROM experiments ORDER BY id").fetchall():
         where = f"{place}: experiment {number}"
-        given = read_info(_document(parameters, f"{where}: parameters"), f"{where}: parameters")
-        if seed is not None and not (isinstance(seed, str) and seed.isascii() and seed.isdigit() and len(seed) < 4000):
-            raise InvalidInputError(f"{where}: seed: {seed!r}; expected a whole number")
-        text = plain_text(version, f"{where}: version")
-        yield Experiment(plain_text(kind, f"{where}: kind"), given, None if seed is None else int(seed), text, number)
+        try:
+            kind, seed, parameters, version = _row(
+                connection, "SELECT kind, seed, parameters, version FROM experiments WHERE id = ?", number, where
+            )
+            given = read_info(_document(parameters, f"{where}: parameters"), f"{where}: parameters")
+            is_seed = isinstance(seed, str) and seed.isascii() and seed.isdigit() and len(seed) < 4000
+            if seed is not None and not is_seed:
+                raise InvalidInputError(f"{where}: seed: {seed!r:.60}; expected a whole number")
+            text = plain_text(version, f"{where}: version")
+            seed = None if seed is None else int(seed)
+            yield number, Experiment(plain_text(kind, f"{where}: kind"), given, seed, text, number)
+        except InvalidInputError as error:
+            yield number, error
 
 
 def read_trials(
@@ -115,35 +131,58 @@ def read_trials(
     Raises:
         InvalidInputError: One that is not as it should be.
     """
-    for row in _rows(connection, place, experiment):
-        yield _trial(connection, row, f"{place}: trial {row[0]!r}", assumptions)
+    for key in _keys(connection, place, experiment):
+        yield _trial(connection, key, f"{place}: trial {key!r}", assumptions)
 
 
 def trials_or_faults(
-    connection: sqlite3.Connection, place: str
+    connection: sqlite3.Connection, place: str, assumptions: Mapping[int | None, Assumptions | None]
 ) -> Iterator[tuple[int, TrialSummary | InvalidInputError]]:
-    """Yield the number of each row of trials, with the trial, or with what is wrong with it."""
-    for row in _rows(connection, place, None):
+    """Yield the number of each row of trials, with the trial, or with what is wrong with it.
+
+    Args:
+        connection: To the database.
+        place: For error messages.
+        assumptions: Of the trials of each experiment, where they are known.
+    """
+    for key in _keys(connection, place, None):
+        (experiment,) = connection.execute("SELECT experiment FROM trials WHERE id = ?", (key,)).fetchone()
         try:
-            yield row[0], _trial(connection, row, f"{place}: trial {row[0]!r}", None)
+            yield key, _trial(connection, key, f"{place}: trial {key!r}", assumptions.get(experiment))
         except InvalidInputError as error:
-            yield row[0], error
+            yield key, error
 
 
-def _rows(connection: sqlite3.Connection, place: str, experiment: int | None) -> Iterator[Sequence[Any]]:
+def _keys(connection: sqlite3.Connection, place: str, experiment: int | None) -> Iterator[int]:
     last = 0
-    columns = "id, experiment, number, verdict, matched, learned, learned_patterns, lost_truth"
     while True:
         page = connection.execute(
-            f"SELECT {columns} FROM trials WHERE id > ? AND (? OR experiment = ?) ORDER BY id LIMIT ?",
+            "SELECT id FROM trials WHERE id > ? AND (? OR experiment = ?) ORDER BY id LIMIT ?",
             (last, experiment is None, experiment, _PAGE),
         ).fetchall()
-        yield from page
+        yield from (key for (key,) in page)
         if len(page) < _PAGE:
             return
         if page[-1][0] <= last:  # only in a damaged file; there it would go on for ever
             raise InvalidInputError(f"{place}: trial {page[-1][0]}; expected trials in ascending order")
         last = page[-1][0]
+
+
+def _row(connection: sqlite3.Connection, question: str, key: int, place: str) -> Sequence[Any]:
+    """Return the one row that a question is answered by, or raise ``InvalidInputError`` if it is no text of UTF-8."""
+    rows = _rows(connection, question, key, place)
+    if len(rows) != 1:
+        raise InvalidInputError(f"{place}: {len(rows)} rows; expected one")
+    return rows[0]
+
+
+def _rows(connection: sqlite3.Connection, question: str, key: int, place: str) -> list[Sequence[Any]]:
+    try:
+        return list(connection.execute(question, (key,)))
+    except sqlite3.OperationalError as error:
+        if "decode" not in str(error):
+            raise
+        raise InvalidInputError(f"{place}: {str(error).splitlines()[0]:.80}; expected texts in UTF-8") from error
 
 
 def find_experiment(connection: sqlite3.Connection, wanted: Experiment) -> int | None:
@@ -167,14 +206,13 @@ def canonical(value: Any) -> str:
         raise InvalidInputError(f"record: {error}; expected values that JSON knows") from error
 
 
-def _trial(
-    connection: sqlite3.Connection, row: Sequence[Any], place: str, assumptions: Assumptions | None
-) -> TrialSummary:
-    key, experiment, number, verdict, matched, learned, patterns, lost = row
+def _trial(connection: sqlite3.Connection, key: int, place: str, assumptions: Assumptions | None) -> TrialSummary:
+    columns = "experiment, number, verdict, matched, learned, learned_patterns, lost_truth"
+    row = _row(connection, f"SELECT {columns} FROM trials WHERE id = ?", key, place)
+    experiment, number, verdict, matched, learned, patterns, lost = row
     steps = []
-    for index, step in enumerate(
-        connection.execute(f"SELECT number, {', '.join(_STEP)} FROM steps WHERE trial = ? ORDER BY number", (key,))
-    ):
+    question = f"SELECT number, {', '.join(_STEP)} FROM steps WHERE trial = ? ORDER BY number"
+    for index, step in enumerate(_rows(connection, question, key, place)):
         where = f"{place}: step {index}"
         if step[0] != index:
             raise InvalidInputError(f"{where}: number {step[0]!r}; expected {index}")
