@@ -8,7 +8,6 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Annotated, Any, Final
 
-import rich.markup
 import rich.table
 import typer
 
@@ -36,7 +35,7 @@ def bench(
     ] = None,
     json_file: options.JsonFile = None,
     markdown: Annotated[
-        Path | None, typer.Option(help=f"Write the tables into this page, between {BEGIN} and {END}.")
+        Path | None, typer.Option(writable=True, help=f"Write the tables into this page, between {BEGIN} and {END}.")
     ] = None,
 ) -> None:
     """Time engines and other libraries side by side: a filter step, a decision, a trial, Table 1.
@@ -54,7 +53,7 @@ def bench(
         plain_files.write_bytes_atomically(markdown, text.encode())
     if json_file != "-":
         console = options.console()
-        console.print(machine_line(document), markup=False)
+        console.print(machine_line(document))
         for table in made:
             _print(console, table)
 
@@ -118,11 +117,9 @@ def _markdown(made: list[Table]) -> str:
 def _print(console: Any, table: Table) -> None:
     if not table.rows and not table.notes:
         return
-    shown = rich.table.Table(
-        title=table.title, title_justify="left", caption=rich.markup.escape("\n".join(table.notes))
-    )
+    shown = rich.table.Table(title=table.title, title_justify="left", caption="\n".join(table.notes))
     for number, heading in enumerate(table.headings):
         shown.add_column(heading, justify="right" if number else "left")
     for row in table.rows:
-        shown.add_row(*map(rich.markup.escape, row))
+        shown.add_row(*row)
     console.print(shown)

@@ -13,6 +13,7 @@ import typer
 from rich.table import Table
 
 from atg_fg.cli import options
+from atg_fg.cli.terminal import say
 from atg_fg.display import figures
 from atg_fg.storage import plain_files
 from atg_fg.storage.presets import write_preset
@@ -56,7 +57,9 @@ def reliability(
 @app.command()
 def calibrate(
     files: Annotated[list[Path], typer.Argument(help="What sim reliability --json wrote.", show_default=False)],
-    output: Annotated[Path, typer.Option(help="Preset file to write; --preset takes it.")] = Path("robot.json"),
+    output: Annotated[Path, typer.Option(writable=True, help="Preset file to write; --preset takes it.")] = Path(
+        "robot.json"
+    ),
     json_file: options.JsonFile = None,
 ) -> None:
     """Estimate the noise of actions and looks from reliability runs, and write the preset that assumes as much.
@@ -76,15 +79,15 @@ def calibrate(
     options.write_json({"command": "sim calibrate", "output": str(output), "preset": document}, json_file)
     if json_file != "-":
         for name, value in {**document["parameters"], "missing_rate": missing_rate}.items():
-            typer.echo(f"{name}: {value}")
-        typer.echo(f"saved: {output}")
+            say(f"{name}: {value}")
+        say(f"saved: {output}")
 
 
 @app.command()
 def picture(
-    output: Annotated[Path, typer.Option(help="PNG file to write.")] = Path("robot.png"),
-    film: Annotated[Path | None, typer.Option(help="Write the robot's three actions as an animated GIF.")] = None,
-    table: Annotated[Path | None, typer.Option(help="Write a picture of the robot before three cubes, PNG.")] = None,
+    output: Annotated[Path, typer.Option(writable=True, help="PNG file to write.")] = Path("robot.png"),
+    film: Annotated[Path | None, typer.Option(writable=True, help="Write the robot's three actions as an animated GIF.")] = None,
+    table: Annotated[Path | None, typer.Option(writable=True, help="Write a picture of the robot before three cubes, PNG.")] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the cubes.")] = 0,
     urdf: options.Urdf = None,
 ) -> None:
@@ -102,7 +105,7 @@ def picture(
         figures.save_film(*draw_actions(seed, urdf), film)
     if table is not None:
         figures.save_image(draw_table(seed, urdf), table)
-    typer.echo(f"saved: {', '.join(str(file) for file in (output, film, table) if file is not None)}")
+    say(f"saved: {', '.join(str(file) for file in (output, film, table) if file is not None)}")
 
 
 def _run(

@@ -12,6 +12,7 @@ import typer.exceptions
 from atg_fg.cli.lazy_commands import LazyCommand, LazyGroup
 from atg_fg.core.errors import AtgError, InvalidInputError
 from atg_fg.core.version import __version__
+from atg_fg.core.visible_text import visible
 
 #: The commands, and groups of them, by the panel of the help page that they stand in; each with its place.
 COMMANDS: Final = {
@@ -120,5 +121,5 @@ def _fail(error: Exception) -> int:
     if isinstance(error, typer.exceptions.TyperException):
         # The parser's own messages do not all hold the value; the command line does.
         message = f"{error.format_message()} (given: {' '.join(sys.argv[1:])}; see --help)"
-    print(f"atg-fg: {' '.join(message.split())}", file=sys.stderr)
+    print(f"atg-fg: {visible(' '.join(message.split()))}", file=sys.stderr)
     return 2

@@ -32,7 +32,9 @@ def ablation(
     executor: options.Executor = "process",
     log: options.Log = None,
     json_file: options.JsonFile = None,
-    plot: Annotated[Path | None, typer.Option(help="Draw the curves into this .png, .svg or .pdf file.")] = None,
+    plot: Annotated[
+        Path | None, typer.Option(writable=True, help="Draw the curves into this .png, .svg or .pdf file.")
+    ] = None,
 ) -> None:
     """Compare the literal model, learning within the trial, learned structure and lookahead, with and without noise.
 

@@ -43,7 +43,9 @@ def demo(
     preset: options.Preset = "default",
     actions: options.Actions = 8,
     novel: Annotated[bool, typer.Option("--novel", help="Present an object the robot has never met.")] = False,
-    output: Annotated[Path, typer.Option(help="Folder for the pictures, the memory and the record.")] = Path("out"),
+    output: Annotated[
+        Path, typer.Option(writable=True, help="Folder for the pictures, the memory and the record.")
+    ] = Path("out"),
     condition: options.Condition = None,
     urdf: options.Urdf = None,
     seed: options.Seed = 0,

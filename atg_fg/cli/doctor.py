@@ -13,8 +13,8 @@ from typing import Final, Literal, TypeAlias
 
 import typer
 from packaging.requirements import Requirement
-from rich.markup import escape
 from rich.table import Table
+from rich.text import Text
 
 from atg_fg.cli import options
 
@@ -37,8 +37,7 @@ def doctor(json_file: options.JsonFile = None) -> None:
 def _table(findings: list[Finding]) -> Table:
     table = Table("", "", "found, or what to do", title="What works here", title_justify="left")
     for finding in findings:
-        status = f"[{_STYLES[finding.status]}]{finding.status}[/]"
-        table.add_row(finding.subject, status, escape(finding.detail))
+        table.add_row(finding.subject, Text(finding.status, style=_STYLES[finding.status]), finding.detail)
     return table
 
 

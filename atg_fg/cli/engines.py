@@ -9,6 +9,7 @@ import typer
 from rich.table import Table
 
 from atg_fg.cli import options
+from atg_fg.cli.terminal import say
 from atg_fg.core.errors import unknown_name
 from atg_fg.engines import ENGINES
 from atg_fg.experiments import calibration, engine_comparison
@@ -110,8 +111,8 @@ def check(
             tenth = f"{each['from']:.1f}-{each['from'] + 0.1:.1f}"
             table.add_row(tenth, str(each["count"]), f"{each['predicted']:.3f}", f"{each['found']:.3f}")
         options.console().print(table)
-        typer.echo(f"reliability error: {summary['reliability_error']:.4f}")
-        typer.echo(
+        say(f"reliability error: {summary['reliability_error']:.4f}")
+        say(
             f"averaged posterior = prior: chi-square {test['statistic']:.2f}, {test['degrees_of_freedom']} degrees of "
             f"freedom, p = {test['p']:.3f}"
         )

@@ -49,7 +49,7 @@ def table1(
     records: Annotated[
         Path | None,
         typer.Option(
-            help="Folder, or database (.db), in which every trial is saved as it ends.", rich_help_panel=options.RUNNING
+            writable=True, help="Folder, or database (.db), in which every trial is saved as it ends.", rich_help_panel=options.RUNNING
         ),
     ] = None,
     smoothed_learning: Annotated[
@@ -71,7 +71,7 @@ def table1(
     save_memories: Annotated[
         Path | None,
         typer.Option(
-            help="Folder in which the memory of each test is saved at its end; a database (.db) for one test.",
+            writable=True, help="Folder in which the memory of each test is saved at its end; a database (.db) for one test.",
             rich_help_panel=options.RUNNING,
         ),
     ] = None,
@@ -194,8 +194,12 @@ def figure3(
     executor: options.Executor = "process",
     json_file: options.JsonFile = None,
     log: options.Log = None,
-    csv_file: Annotated[Path | None, typer.Option("--csv", help="Write the points as CSV to this file.")] = None,
-    plot: Annotated[Path | None, typer.Option(help="Draw the figure into this .png, .svg or .pdf file.")] = None,
+    csv_file: Annotated[
+        Path | None, typer.Option("--csv", writable=True, help="Write the points as CSV to this file.")
+    ] = None,
+    plot: Annotated[
+        Path | None, typer.Option(writable=True, help="Draw the figure into this .png, .svg or .pdf file.")
+    ] = None,
 ) -> None:
     """Run the paper's Figure 3: success of the entropy and the random policy by number of actions.
 

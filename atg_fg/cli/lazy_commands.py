@@ -31,10 +31,10 @@ class LazyCommand(TyperCommand):
         """Import the command and return it, as Typer makes it."""
         found: typer.Typer | Callable[..., Any] = getattr(import_module(self._module), self._attribute)
         if isinstance(found, typer.Typer):
-            return typer.main.get_group(found)
+            return _guarded(typer.main.get_group(found))
         only = typer.Typer(add_completion=False)
         only.command(self.name)(found)
-        return typer.main.get_command(only)
+        return _guarded(typer.main.get_command(only))
 
     def read_help(self) -> None:
         """Find the help without importing the command; import it where its source does not tell."""
@@ -54,6 +54,20 @@ class LazyGroup(TyperGroup):
             if isinstance(command, LazyCommand):
                 command.read_help()
         super().format_help(ctx, formatter)
+
+
+def _guarded(command: Any) -> Any:
+    """Return a command, or a group with all of its commands, that writes over nothing that it reads."""
+    from atg_fg.cli.paths import guarded  # not needed for the list of commands
+
+    commands: list[Any] = list(command.commands.values()) if isinstance(command, TyperGroup) else [command]
+    for each in commands:
+        labels = {
+            given.name: given.name.upper() if given.param_type_name == "argument" else given.opts[0]
+            for given in each.params
+        }
+        each.callback = guarded(each.callback, labels.__getitem__)
+    return command
 
 
 def _help_in_source(module: str, attribute: str) -> str | None:

@@ -11,6 +11,7 @@ import typer
 from rich.table import Table
 
 from atg_fg.cli import memory_compact, memory_duplicates, memory_files, options, structure
+from atg_fg.cli.terminal import say
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.storage import plain_files
@@ -58,7 +59,7 @@ def show(file: options.MemoryFile, json_file: options.JsonFile = None) -> None:
     if memory is not None:
         _print_objects(f"{file}: {len(memory)} of {memory.assumptions.n_objects} objects", document["objects"])
     for each in records.get("experiments", ()):
-        typer.echo(f"{each['kind']}, seed {each['seed']}, atg-fg {each['version']}: {each['trials']} trials")
+        say(f"{each['kind']}, seed {each['seed']}, atg-fg {each['version']}: {each['trials']} trials")
 
 
 def _rows(memory: RobotMemory) -> list[dict[str, Any]]:
@@ -115,6 +116,11 @@ def check(file: options.MemoryFile, json_file: options.JsonFile = None) -> int:
     Example: atg-fg memory check robot.db
     """
     options.check_json_option(json_file)
+    with plain_files.readable_again(file) as there:
+        return _check(there, json_file)
+
+
+def _check(file: Path, json_file: str | None) -> int:
     faults = faults_of_database(file) if is_database(file) else _faults_of_json(file)
     memory = None if faults or not _holds_memory(file) else load_memory(file)
     sound: dict[str, Any] = {"sound": not faults}
@@ -125,7 +131,7 @@ def check(file: options.MemoryFile, json_file: options.JsonFile = None) -> int:
     options.write_json({"command": "memory check", **sound}, json_file)
     if json_file != "-":
         for line in faults or [f"{file}: sound, {sound['objects']} ATGs"]:
-            typer.echo(line)
+            say(line)
     return 1 if faults else 0
 
 

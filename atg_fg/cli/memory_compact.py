@@ -8,6 +8,7 @@ from typing import Annotated
 import typer
 
 from atg_fg.cli import options
+from atg_fg.cli.terminal import say
 from atg_fg.core.compact.compact_memory import CompactMemory
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.storage import memory_files, plain_files
@@ -16,7 +17,7 @@ from atg_fg.storage.compact_file import SUFFIX, is_compact
 
 def compact(
     file: options.MemoryFile,
-    output: Annotated[Path, typer.Option(help="File of arrays to write, .npz.", show_default=False)],
+    output: Annotated[Path, typer.Option(writable=True, help="File of arrays to write, .npz.", show_default=False)],
     json_file: options.JsonFile = None,
 ) -> None:
     """Write the ATGs of a memory as arrays, which load a hundred times as fast; for the engine large-memory.
@@ -33,4 +34,4 @@ def compact(
     document = {"command": "memory compact", "objects": len(made), "bytes": made.nbytes}
     options.write_json(document, json_file)
     if json_file != "-":
-        typer.echo(f"{output}: {len(made)} ATGs, {made.nbytes} bytes in memory")
+        say(f"{output}: {len(made)} ATGs, {made.nbytes} bytes in memory")

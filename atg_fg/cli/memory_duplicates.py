@@ -11,6 +11,7 @@ from typing import Annotated
 import typer
 
 from atg_fg.cli import options
+from atg_fg.cli.terminal import say
 from atg_fg.core.memory import RobotMemory
 from atg_fg.learning.duplicates import find_duplicates
 from atg_fg.learning.structured_memory import StructuredMemory
@@ -52,9 +53,9 @@ def duplicates(
     options.write_json(document, json_file)
     if json_file != "-":
         did = "merged" if merge else "probably of one object"
-        typer.echo(f"{file}: {len(pairs)} pairs of {len(memory) + len(pairs) * merge} ATGs {did}")
+        say(f"{file}: {len(pairs)} pairs of {len(memory) + len(pairs) * merge} ATGs {did}")
         for pair in pairs:
-            typer.echo(f"{pair.keep} and {pair.drop}: log odds {pair.log_odds:.1f}")
+            say(f"{pair.keep} and {pair.drop}: log odds {pair.log_odds:.1f}")
 
 
 def unmerge(
@@ -66,7 +67,7 @@ def unmerge(
     """
     with _changed(file) as memory:
         memory.unmerge(name)
-    typer.echo(f"{file}: {name} is an ATG of its own again")
+    say(f"{file}: {name} is an ATG of its own again")
 
 
 @contextmanager

@@ -10,6 +10,7 @@ from typing import Annotated, Any, Final
 import typer
 
 from atg_fg.cli import options
+from atg_fg.cli.terminal import say, say_document
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.records import Experiment, TrialSummary
@@ -42,7 +43,9 @@ def export(
     completed: Annotated[
         bool, typer.Option("--completed", help="Add the aspects and transitions that the learned structure predicts.")
     ] = False,
-    output: Annotated[Path | None, typer.Option(help="File to write; standard output if not given.")] = None,
+    output: Annotated[
+        Path | None, typer.Option(writable=True, help="File to write; standard output if not given.")
+    ] = None,
 ) -> None:
     """Export one ATG as GraphML or DOT, the whole memory as JSON, or its trials, a line of JSON each.
 
@@ -59,7 +62,7 @@ def export(
     else:
         text = _trials_text(file)
     if output is None:
-        typer.echo(text, nl=False)
+        say_document(text)
     else:
         plain_files.write_bytes_atomically(output, text.encode())
 
@@ -95,7 +98,9 @@ def import_files(
         list[Path],
         typer.Argument(help="Memories (JSON or databases), and logs of trials (.jsonl.gz).", show_default=False),
     ],
-    into: Annotated[Path, typer.Option(help="The database; made if it is not there.", show_default=False)],
+    into: Annotated[
+        Path, typer.Option(writable=True, help="The database; made if it is not there.", show_default=False)
+    ],
 ) -> None:
     """Put a memory, and records of trials, into a database: all of them, or nothing.
 
@@ -122,7 +127,7 @@ def _import(files: list[Path], into: Path) -> None:
         added = [add_records(connection, str(into), each) for each in records]
     n_objects = sum(map(len, full))
     n_experiments, n_trials = (sum(counts[kind] for counts in added) for kind in (0, 1))
-    typer.echo(f"{into}: {n_objects} ATGs, {n_experiments} experiments and {n_trials} trials imported")
+    say(f"{into}: {n_objects} ATGs, {n_experiments} experiments and {n_trials} trials imported")
 
 
 def _is_log(file: Path) -> bool:
@@ -140,7 +145,7 @@ def _has_memory(file: Path) -> bool:
 def merge(
     first: Annotated[Path, typer.Argument(help="A memory; its names stay.", show_default=False)],
     second: Annotated[Path, typer.Argument(help="Another memory.", show_default=False)],
-    output: Annotated[Path, typer.Option("--output", "-o", help="The new file.", show_default=False)],
+    output: Annotated[Path, typer.Option("--output", "-o", writable=True, help="The new file.", show_default=False)],
     json_file: options.JsonFile = None,
 ) -> None:
     """Unite two memories. ATGs of the same name are one object if one of them goes on where the other one is.
@@ -169,9 +174,9 @@ def merge(
     }
     options.write_json(document, json_file)
     if json_file != "-":
-        typer.echo(f"{output}: {len(union.memory)} ATGs, {len(union.same)} of them in both; {n_trials} trials")
+        say(f"{output}: {len(union.memory)} ATGs, {len(union.same)} of them in both; {n_trials} trials")
         for old, new in union.renamed.items():
-            typer.echo(f"{second}: {old} is {new}")
+            say(f"{second}: {old} is {new}")
 
 
 def _save_with_records(memory: RobotMemory, output: Path, first: Path, second: Path, renamed: dict[str, str]) -> int:
@@ -198,7 +203,7 @@ def diff(
     options.write_json({"command": "memory diff", "same": not found, "difference": found}, json_file)
     if json_file != "-":
         for line in _told(found):
-            typer.echo(line)
+            say(line)
     return 1 if found else 0
 
 

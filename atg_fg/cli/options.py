@@ -11,9 +11,9 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
+from atg_fg.cli.terminal import PlainConsole
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.engines import ENGINES, usual_engine
@@ -86,11 +86,11 @@ Executor = Annotated[
 Log = Annotated[
     Path | None,
     typer.Option(
-        help="Keep each test in this .jsonl file as it ends, and leave out those in it.", rich_help_panel=RUNNING
+        writable=True, help="Keep each test in this .jsonl file as it ends, and leave out those in it.", rich_help_panel=RUNNING
     ),
 ]
 JsonFile = Annotated[
-    str | None, typer.Option("--json", help="Write the result as JSON to this file, or - to print it.")
+    str | None, typer.Option("--json", writable=True, help="Write the result as JSON to this file, or - to print it.")
 ]
 Slip = Annotated[
     float, typer.Option(help="Probability that an action fails and the object stays as it is.", rich_help_panel=WORLD)
@@ -188,15 +188,15 @@ def write_json(document: dict[str, Any], path: str | None) -> None:
         plain_files.write_bytes_atomically(path, text.encode())
 
 
-def console(json_path: str | None = None) -> Console:
+def console(json_path: str | None = None) -> PlainConsole:
     """Return where tables go: standard output, or standard error if that is taken by JSON."""
-    return Console(stderr=json_path == "-", highlight=False)
+    return PlainConsole(stderr=json_path == "-")
 
 
 @contextmanager
 def progress_bar(description: str, total: int) -> Iterator[Any]:
     """Show a progress bar on a terminal; give a function that advances it by one."""
-    error_console = Console(stderr=True)
+    error_console = PlainConsole(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=error_console, transient=True, disable=not error_console.is_terminal) as progress:
         task = progress.add_task(description, total=total)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from rich.console import Console
-from rich.text import Text
 
 from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.memory import RobotMemory
@@ -32,7 +31,7 @@ class Story:
             f"{slot} {'not seen' if symbol is None else symbol}"
             for slot, symbol in zip(self.assumptions.alphabet.slots, step.detection, strict=True)
         )
-        self.console.print(Text(f"look {self._time}: {seen}", style="bold"))
+        self.console.print(f"look {self._time}: {seen}", style="bold")
         for name, probability in self._top(step.belief):
             bar = "█" * round(_BAR * probability)
             self.console.print(f"    {name:<12} {probability:6.1%} {bar}")
@@ -57,7 +56,7 @@ class Story:
             best = belief.most_probable_object
             probability = 0.0 if best is None else float(belief.objects[best])
             text = f"verdict: {record.matched} (probability {probability:.1%})"
-        self.console.print(Text(text, style="bold green"))
+        self.console.print(text, style="bold green")
 
     def _top(self, belief: IdentityBelief) -> list[tuple[str, float]]:
         """Return the three most probable remembered objects, and *unseen*."""

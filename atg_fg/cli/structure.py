@@ -12,6 +12,7 @@ import typer
 from rich.table import Table
 
 from atg_fg.cli import options
+from atg_fg.cli.terminal import say
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.display import figures
 from atg_fg.display.completed_picture import draw_completed_atg, probability_text
@@ -28,7 +29,10 @@ def structure(
     name: Annotated[str | None, typer.Option("--object", help="Show what is predicted of this object.")] = None,
     plot: Annotated[
         Path | None,
-        typer.Option(help="Draw the structure, or the completed ATG of --object, into this .png, .svg or .pdf file."),
+        typer.Option(
+            writable=True,
+            help="Draw the structure, or the completed ATG of --object, into this .png, .svg or .pdf file.",
+        ),
     ] = None,
     json_file: options.JsonFile = None,
 ) -> None:
@@ -72,7 +76,7 @@ def _tell_none(file: Path, memory: StructuredMemory | None, plot: Path | None, j
     trials = 0 if memory is None else len(memory.learner.trials)
     options.write_json({"command": "structure show", "trials": trials, "structures": [], "objects": []}, json_file)
     if json_file != "-":
-        typer.echo(f"{file}: no learned structure: {reason}")
+        say(f"{file}: no learned structure: {reason}")
 
 
 def _document(
@@ -129,7 +133,7 @@ def _tell(file: Path, document: dict[str, Any]) -> None:
         )
         for action, sources in structure["sources"].items():
             indices = [registers.index(source) for source in sources]
-            console.print(f"  {action}: {action_text(indices, registers)}", markup=False, soft_wrap=True)
+            console.print(f"  {action}: {action_text(indices, registers)}", soft_wrap=True)
     rates = ", ".join(f"{name} {value:.4f}" for name, value in document["rates"].items())
     console.print(f"rates: {rates}")
     table = Table()

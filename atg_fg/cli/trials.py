@@ -48,9 +48,11 @@ def trial(
         Path | None, typer.Option(help="Memory file (JSON, .db or .npz) to start from; empty if not given.")
     ] = None,
     save_memory: Annotated[
-        Path | None, typer.Option(help="Save the memory with what was learned to this file.")
+        Path | None, typer.Option(writable=True, help="Save the memory with what was learned to this file.")
     ] = None,
-    record: Annotated[Path | None, typer.Option(help="Write the trial's record as JSON lines to this file.")] = None,
+    record: Annotated[
+        Path | None, typer.Option(writable=True, help="Write the trial's record as JSON lines to this file.")
+    ] = None,
     frames: Annotated[
         bool, typer.Option("--frames", help="Save what the camera sees at each look in a folder beside the record.")
     ] = False,

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 import typer
 
 from atg_fg.cli import options
+from atg_fg.cli.terminal import say
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.inference.elimination import queries
 from atg_fg.inference.elimination.discrete_model import DiscreteModel
@@ -55,7 +56,7 @@ def solve(
     line, answer = TASKS[task](read, observed, limit)
     options.write_json({"command": "uai solve", "model": str(model), "task": task, **answer}, json_file)
     if json_file != "-":
-        typer.echo(f"{task}\n{line}")
+        say(task, line)
 
 
 def _partition(model: DiscreteModel, evidence: dict[int, int], limit: int) -> _Answer:
@@ -89,20 +90,16 @@ TASKS: dict[str, Callable[[DiscreteModel, dict[int, int], int], _Answer]] = {
 @app.command()
 def export(
     script: Annotated[Path, typer.Argument(help="A scripted trial (JSON).", show_default=False)],
-    model: Annotated[Path, typer.Option(help="Write the trial's factor graph to this file.")],
-    evidence: Annotated[Path, typer.Option(help="Write what was seen to this file.")],
+    model: Annotated[Path, typer.Option(writable=True, help="Write the trial's factor graph to this file.")],
+    evidence: Annotated[Path, typer.Option(writable=True, help="Write what was seen to this file.")],
 ) -> None:
     """Write the factor graph of a scripted trial and its evidence in the UAI format.
 
     Example: atg-fg uai export trial.json --model trial.uai --evidence trial.uai.evid
     """
-    if model.resolve() == evidence.resolve():
-        raise InvalidInputError(f"--evidence: {evidence} is the file of --model too; expected another file")
     for path in (model, evidence):
         plain_files.check_writable(path)
     exported = export_trial(read_script(plain_files.read_text_file(script), str(script)))
     plain_files.write_bytes_atomically(model, write_model(exported.model).encode())
     plain_files.write_bytes_atomically(evidence, write_evidence(exported.evidence).encode())
-    typer.echo(
-        f"{model}: {len(exported.names)} variables, {', '.join(exported.names)}; {len(exported.model.factors)} factors"
-    )
+    say(f"{model}: {len(exported.names)} variables, {', '.join(exported.names)}; {len(exported.model.factors)} factors")

@@ -12,6 +12,7 @@ import typer
 from atg_fg.cli import options
 from atg_fg.cli.demo import N_REMEMBERED, learn_beforehand
 from atg_fg.cli.story import Story
+from atg_fg.cli.terminal import say
 from atg_fg.core.records import TrialStep
 from atg_fg.display.rerun_viewer import TrialViewer, check_path, import_rerun
 from atg_fg.engines import begin_trial, check_engine
@@ -30,7 +31,8 @@ def watch(
     actions: options.Actions = 8,
     novel: Annotated[bool, typer.Option("--novel", help="Present an object the robot has never met.")] = False,
     save: Annotated[
-        Path | None, typer.Option(help="Save a recording (.rrd) instead of opening the viewer; needs no screen.")
+        Path | None,
+        typer.Option(writable=True, help="Save a recording (.rrd) instead of opening the viewer; needs no screen."),
     ] = None,
     condition: options.Condition = None,
     urdf: options.Urdf = None,
@@ -71,4 +73,4 @@ def watch(
         viewer.verdict(record)
         viewer.close()
     if save is not None:
-        typer.echo(f"saved: {save}")
+        say(f"saved: {save}")

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atg_fg.core.errors import InvalidInputError, MissingDependencyError
+from atg_fg.core.visible_text import visible
 from atg_fg.storage import plain_files
 
 if TYPE_CHECKING:
@@ -180,9 +181,25 @@ def figure_class() -> type[Figure]:
     return NotebookFigure
 
 
+def _show_what_steers(figure: Figure) -> None:
+    """Write out control characters in all texts of a figure: fonts have no sign for them, and SVG cannot hold them."""
+    from matplotlib.text import Text
+    from matplotlib.ticker import FixedFormatter
+
+    for text in figure.findobj(Text):
+        if isinstance(text, Text):
+            text.set_text(visible(text.get_text(), keep="\n"))
+    for axes in figure.axes:
+        for axis in (axes.xaxis, axes.yaxis):
+            formatter = axis.get_major_formatter()
+            if isinstance(formatter, FixedFormatter):
+                axis.set_major_formatter(FixedFormatter([visible(label, keep="\n") for label in formatter.seq]))
+
+
 def _rendered(figure: Figure, kind: str, dpi: float = 200) -> bytes:
     import matplotlib
 
+    _show_what_steers(figure)
     buffer = io.BytesIO()
     # Without a fixed salt, the ids inside an SVG differ from run to run; fonts of type 42 stay selectable.
     settings: Any = {**_STYLE, "svg.hashsalt": "atg-fg", "pdf.fonttype": 42}

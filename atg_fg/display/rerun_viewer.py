@@ -7,6 +7,7 @@ A world that has something to show offers ``show_in(recording)``: from then on i
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from types import ModuleType
 from typing import Any, Final
@@ -15,6 +16,7 @@ from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.errors import InvalidInputError, MissingDependencyError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.records import TrialRecord, TrialStep
+from atg_fg.core.visible_text import visible
 from atg_fg.display.figures import PALETTE
 from atg_fg.storage.plain_files import check_writable, write_bytes_atomically
 from atg_fg.worlds.base import World
@@ -144,7 +146,7 @@ class TrialViewer:
         order = belief.objects.argsort(kind="stable")[::-1][:_NAMED]
         rows = [(index, self._names[index], float(belief.objects[index])) for index in order.tolist()]
         rows.append((len(self._names), "unseen", belief.unseen))
-        lines = [f"| {bar} | {name} | {share:.1%} |" for bar, name, share in rows]
+        lines = [f"| {bar} | {_as_markdown(name)} | {share:.1%} |" for bar, name, share in rows]
         return "\n".join(["| bar | object | probability |", "|---|---|---|", *lines])
 
     def _layout(self) -> Any:
@@ -170,6 +172,11 @@ class TrialViewer:
             views.TimePanel(timeline="look"),
             collapse_panels=True,
         )
+
+
+def _as_markdown(name: str) -> str:
+    """Return a name that Markdown shows as it is, in a cell of a table."""
+    return re.sub(r"([\\`*_{}\[\]<>()#+!|~&])", r"\\\1", visible(name))
 
 
 def check_path(path: Path) -> None:

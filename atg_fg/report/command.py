@@ -22,7 +22,9 @@ def report(
             show_default=False,
         ),
     ],
-    output: Annotated[Path, typer.Option("--output", "-o", help="HTML file to write.")] = Path("report.html"),
+    output: Annotated[Path, typer.Option("--output", "-o", writable=True, help="HTML file to write.")] = Path(
+        "report.html"
+    ),
     memory: Annotated[
         Path | None, typer.Option(help="Memory that the trial began with, for the ATGs of what it remembered.")
     ] = None,

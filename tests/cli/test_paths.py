@@ -1,0 +1,141 @@
+"""No command writes over a file that it reads: every pair of paths of every command, by every kind of link."""
+
+import os
+from itertools import combinations
+
+import pytest
+import typer
+
+from atg_fg.cli import app
+from atg_fg.cli.paths import IN_PLACE, parameters_of
+
+#: What each command writes to.
+OUTPUTS = {
+    "ablation": {"json_file", "log", "plot"},
+    "bench": {"json_file", "markdown"},
+    "calibrate": {"json_file"},
+    "compare": {"json_file"},
+    "demo": {"json_file", "output"},
+    "doctor": {"json_file"},
+    "explain": {"json_file"},
+    "figure3": {"json_file", "log", "csv_file", "plot"},
+    "goal": {"json_file", "records", "video"},
+    "memory check": {"json_file"},
+    "memory compact": {"json_file", "output"},
+    "memory diff": {"json_file"},
+    "memory duplicates": {"json_file"},
+    "memory export": {"output"},
+    "memory import": {"into"},
+    "memory merge": {"json_file", "output"},
+    "memory show": {"json_file"},
+    "memory unmerge": set(),
+    "replay": set(),
+    "report": {"output"},
+    "rescore": {"json_file"},
+    "sim calibrate": {"json_file", "output"},
+    "sim picture": {"output", "film", "table"},
+    "sim reliability": {"json_file"},
+    "structure show": {"json_file", "plot"},
+    "table1": {"json_file", "records", "save_memories"},
+    "trial": {"json_file", "record", "save_memory"},
+    "uai export": {"model", "evidence"},
+    "uai solve": {"json_file"},
+    "watch": {"save"},
+}
+
+
+def commands(group, name=()):
+    for word, command in group.commands.items():
+        loaded = command.load() if hasattr(command, "load") else command
+        if hasattr(loaded, "commands"):
+            yield from commands(loaded, (*name, word))
+        else:
+            yield " ".join((*name, word)), loaded
+
+
+COMMANDS = dict(commands(typer.main.get_command(app)))
+PATHS = {name: parameters_of(command.callback) for name, command in COMMANDS.items()}
+PAIRS = [
+    (name, one.name, other.name)
+    for name, paths in PATHS.items()
+    for one, other in combinations(paths, 2)
+    if (one.written or other.written) and {one.name, other.name} not in IN_PLACE
+]
+
+
+def arguments(name, **paths):
+    """Return a command line that gives these paths, and something for all else that must be given."""
+    words = name.split()
+    for parameter in COMMANDS[name].params:
+        given = paths.get(parameter.name)
+        if given is None and parameter.required:
+            given = "MAR" if parameter.name == "task" else "something-else"
+        if given is not None:
+            words += [str(given)] if parameter.param_type_name == "argument" else [parameter.opts[0], str(given)]
+    return words
+
+
+def hard_link(there, folder):
+    os.link(there, folder / "hard.json")
+    return folder / "hard.json"
+
+
+def soft_link(there, folder):
+    (folder / "far").mkdir()
+    (folder / "far" / "soft.json").symlink_to(there)
+    return folder / "far" / "soft.json"
+
+
+def dangling_link(there, folder):
+    there.unlink()
+    return soft_link(there, folder)
+
+
+SAME = {
+    "itself": lambda there, _: there,
+    "another spelling": lambda there, folder: folder / ".." / folder.name / "." / there.name,
+    "a link": soft_link,
+    "a hard link": hard_link,
+    "a link to a file yet to be made": dangling_link,
+}
+
+
+def test_the_paths_that_a_command_writes_to_are_declared_as_such():
+    assert {name: {path.name for path in paths if path.written} for name, paths in PATHS.items()} == OUTPUTS
+
+
+@pytest.mark.parametrize("same", SAME)
+@pytest.mark.parametrize(("name", "one", "other"), PAIRS, ids=map(" ".join, PAIRS))
+def test_one_file_for_two_paths_of_a_command_is_refused_and_stays_as_it_was(tmp_path, refused, name, one, other, same):
+    there = tmp_path / "there.json"
+    there.write_bytes(b"precious")
+    error = refused(*arguments(name, **{one: there, other: SAME[same](there, tmp_path)}))
+    assert "and would be overwritten; expected another file" in error
+    assert not there.exists() or there.read_bytes() == b"precious"
+    assert sorted(path.name for path in tmp_path.iterdir()) in (
+        ["there.json"],
+        ["far", "there.json"],
+        ["hard.json", "there.json"],
+        ["far"],
+    )
+
+
+@pytest.mark.parametrize("end", ["-wal", "-shm", "-journal"])
+def test_what_sqlite_keeps_beside_a_database_is_a_part_of_it(tmp_path, refused, end):
+    assert "would be overwritten" in refused(
+        "memory", "show", tmp_path / "robot.db", "--json", tmp_path / f"robot.db{end}"
+    )
+
+
+@pytest.mark.parametrize("name", ["test-0000.jsonl.gz", "run-0003.json.gz", "look-012.png", "memory.json"])
+def test_what_a_command_makes_in_a_folder_is_no_place_for_another_result(tmp_path, refused, name):
+    error = refused("goal", "--records", tmp_path, "--json", tmp_path / name)
+    assert "would be overwritten" in error
+
+
+def test_two_outputs_may_go_to_a_device_and_a_result_beside_the_records(tmp_path, run):
+    words = ("figure3", "--actions", "1", "--tests", "1", "--trials", "1", "--jobs", "1")
+    assert run(*words, "--json", "/dev/null", "--csv", "/dev/null")[0] == 0
+    words = ("table1", "--actions", "1", "--tests", "1", "--trials", "1", "--jobs", "1", "--engine", "bayes-filter")
+    assert run(*words, "--records", tmp_path, "--json", tmp_path / "table1.json")[0] == 0
+    assert (tmp_path / "table1.json").exists()
