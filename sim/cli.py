@@ -86,8 +86,12 @@ def calibrate(
 @app.command()
 def picture(
     output: Annotated[Path, typer.Option(writable=True, help="PNG file to write.")] = Path("robot.png"),
-    film: Annotated[Path | None, typer.Option(writable=True, help="Write the robot's three actions as an animated GIF.")] = None,
-    table: Annotated[Path | None, typer.Option(writable=True, help="Write a picture of the robot before three cubes, PNG.")] = None,
+    film: Annotated[
+        Path | None, typer.Option(writable=True, help="Write the robot's three actions as an animated GIF.")
+    ] = None,
+    table: Annotated[
+        Path | None, typer.Option(writable=True, help="Write a picture of the robot before three cubes, PNG.")
+    ] = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the cubes.")] = 0,
     urdf: options.Urdf = None,
 ) -> None:

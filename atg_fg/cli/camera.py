@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from atg_fg.cli import options
+from atg_fg.cli.terminal import say
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.storage import plain_files
 
@@ -43,7 +44,9 @@ def calibrate(
     square: Square = 35.0,
     tag: BoardTag = 26.0,
     dictionary: BoardDictionary = "5X5_50",
-    output: Annotated[Path, typer.Option("--output", "-o", help="Calibration to write, JSON.")] = Path("camera.json"),
+    output: Annotated[Path, typer.Option("--output", "-o", writable=True, help="Calibration to write, JSON.")] = Path(
+        "camera.json"
+    ),
     json_file: options.JsonFile = None,
 ) -> None:
     """Measure a camera and its lens from pictures of a board (OpenCV's ChArUco), such as print board makes.
@@ -64,11 +67,11 @@ def calibrate(
     options.write_json(document, str(output))
     options.write_json({"command": "camera calibrate", "output": str(output), "calibration": document}, json_file)
     if json_file != "-":
-        typer.echo(
+        say(
             f"{found.n_pictures} pictures show the board; its corners lie {found.error:.2f} pixels off, "
             f"the field of view is {found.field_of_view:.1f} degrees"
         )
-        typer.echo(f"saved: {output}")
+        say(f"saved: {output}")
 
 
 def _images(paths: list[Path]) -> Iterator[tuple[str, NDArray[np.uint8]]]:

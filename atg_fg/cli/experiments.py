@@ -49,7 +49,9 @@ def table1(
     records: Annotated[
         Path | None,
         typer.Option(
-            writable=True, help="Folder, or database (.db), in which every trial is saved as it ends.", rich_help_panel=options.RUNNING
+            writable=True,
+            help="Folder, or database (.db), in which every trial is saved as it ends.",
+            rich_help_panel=options.RUNNING,
         ),
     ] = None,
     smoothed_learning: Annotated[
@@ -71,7 +73,8 @@ def table1(
     save_memories: Annotated[
         Path | None,
         typer.Option(
-            writable=True, help="Folder in which the memory of each test is saved at its end; a database (.db) for one test.",
+            writable=True,
+            help="Folder in which the memory of each test is saved at its end; a database (.db) for one test.",
             rich_help_panel=options.RUNNING,
         ),
     ] = None,

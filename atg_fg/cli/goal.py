@@ -78,14 +78,20 @@ def goal(
     executor: options.Executor = "process",
     records: Annotated[
         Path | None,
-        typer.Option(writable=True, help="Folder in which every run is saved as it ends.", rich_help_panel=options.RUNNING),
+        typer.Option(
+            writable=True, help="Folder in which every run is saved as it ends.", rich_help_panel=options.RUNNING
+        ),
     ] = None,
     resume: Annotated[
         bool, typer.Option("--resume", help="Leave out the runs that --records holds.", rich_help_panel=options.RUNNING)
     ] = False,
     video: Annotated[
         Path | None,
-        typer.Option(writable=True, help="Film the first run into this .gif: a world with a camera.", rich_help_panel=options.RUNNING),
+        typer.Option(
+            writable=True,
+            help="Film the first run into this .gif: a world with a camera.",
+            rich_help_panel=options.RUNNING,
+        ),
     ] = None,
     json_file: options.JsonFile = None,
 ) -> None:

@@ -19,6 +19,7 @@ from atg_fg.cli.lens_options import (
     lens_of,
     tags_of,
 )
+from atg_fg.cli.paths import same_file
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.storage import plain_files
 
@@ -37,7 +38,9 @@ def look(
     tag_size: TagSize = 45.0,
     calibration: CalibrationFile = None,
     field_of_view: FieldOfView = USUAL_FIELD_OF_VIEW,
-    draw: Annotated[Path | None, typer.Option(help="Folder for the images with the tags drawn in.")] = None,
+    draw: Annotated[
+        Path | None, typer.Option(writable=True, help="Folder for the images with the tags drawn in.")
+    ] = None,
     json_file: options.JsonFile = None,
 ) -> None:
     """Look at photographs: which tags are in them, where, and how surely they were read.
@@ -49,15 +52,33 @@ def look(
     options.check_json_option(json_file)
     known = tags_of(tags, dictionary, tag_size)
     if draw is not None:
+        _check_drawings(draw, images)
         plain_files.make_folder(draw)
     looks = [_look(image, known, tags, tag_size, calibration, field_of_view) for image in images]
     for path, image, detector, found in looks:
         if draw is not None:
-            _draw(image, found, draw / f"{path.stem}.png")
+            _draw(image, found, _drawing(draw, path))
         if json_file != "-":
             options.console().print(_table(str(path), detector, found) if found else f"{path}: no tags", soft_wrap=True)
     document = {"command": "look", "images": [_document(path, detector, found) for path, _, detector, found in looks]}
     options.write_json(document, json_file)
+
+
+def _check_drawings(folder: Path, images: list[Path]) -> None:
+    """Refuse a folder in which a drawing would overwrite an image, or another drawing."""
+    drawings: dict[Path, Path] = {}
+    for image in images:
+        drawing = _drawing(folder, image)
+        spared = next((each for each in images if same_file(each, drawing)), None) or drawings.get(drawing)
+        if spared is not None:
+            raise InvalidInputError(
+                f"--draw: {drawing} would overwrite what is there of {spared}; expected another folder"
+            )
+        drawings[drawing] = image
+
+
+def _drawing(folder: Path, image: Path) -> Path:
+    return folder / f"{image.stem}.png"
 
 
 def _look(

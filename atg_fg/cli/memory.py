@@ -95,7 +95,7 @@ def _records(file: Path) -> dict[str, Any]:
 
 @app.command()
 def example(
-    output: Annotated[Path, typer.Argument(help="File to write (JSON).", show_default=False)],
+    output: Annotated[Path, typer.Argument(writable=True, help="File to write (JSON).", show_default=False)],
 ) -> None:
     """Write the memory that comes with atg-fg: cubes, learned in 30 trials of 10 actions with the preset learned.
 
@@ -104,7 +104,7 @@ def example(
     text = example_memory()
     memory = memory_from_json(text, "cubes.json")
     plain_files.write_bytes_atomically(output, text.encode())
-    typer.echo(f"{output}: {len(memory)} of {memory.assumptions.n_objects} objects")
+    say(f"{output}: {len(memory)} of {memory.assumptions.n_objects} objects")
 
 
 @app.command()

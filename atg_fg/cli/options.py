@@ -86,7 +86,9 @@ Executor = Annotated[
 Log = Annotated[
     Path | None,
     typer.Option(
-        writable=True, help="Keep each test in this .jsonl file as it ends, and leave out those in it.", rich_help_panel=RUNNING
+        writable=True,
+        help="Keep each test in this .jsonl file as it ends, and leave out those in it.",
+        rich_help_panel=RUNNING,
     ),
 ]
 JsonFile = Annotated[

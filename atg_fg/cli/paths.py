@@ -35,6 +35,10 @@ IN_FOLDERS: Final = re.compile(
 _BESIDE: Final = ("-wal", "-shm", "-journal")
 
 
+#: What is printed has the tags beside it, in a file of the same name that ends in ``.json``.
+_PRINTED: Final = (".pdf", ".3mf", ".stl")
+
+
 class Parameter(NamedTuple):
     """A parameter of a command that is a path.
 
@@ -62,9 +66,13 @@ def parameters_of(command: Callable[..., Any]) -> list[Parameter]:
             continue
         kind, *extras = get_args(hint)
         written = any(isinstance(extra, ParameterInfo) and extra.writable for extra in extras)
-        if written or Path in (kind, *get_args(kind)) or name == "preset":
+        if written or _is_path(kind) or name == "preset":
             found.append(Parameter(name, written))
     return found
+
+
+def _is_path(kind: Any) -> bool:
+    return kind is Path or any(map(_is_path, get_args(kind)))
 
 
 def guarded(command: Callable[..., Any], label: Callable[[str], str]) -> Callable[..., Any]:
@@ -103,18 +111,21 @@ def _collide(one: _Given, other: _Given) -> bool:
     """Return whether one is written to, and the other one is the same file, or a file that it makes or keeps."""
     if not (one.parameter.written or other.parameter.written):
         return False
-    if _same(one.path, other.path):
+    if same_file(one.path, other.path):
         return True
     for first, second in ((one, other), (other, one)):
-        if second.parameter.written and any(_same(Path(f"{first.path}{end}"), second.path) for end in _BESIDE):
+        if second.parameter.written and any(same_file(Path(f"{first.path}{end}"), second.path) for end in _BESIDE):
+            return True
+        printed = first.parameter.written and first.path.suffix.lower() in _PRINTED
+        if printed and same_file(first.path.with_suffix(".json"), second.path):
             return True
         made = first.parameter.written and first.path.is_dir() and IN_FOLDERS.fullmatch(second.path.name)
-        if made and _same(first.path, second.path.parent):
+        if made and same_file(first.path, second.path.parent):
             return True
     return False
 
 
-def _same(one: Path, other: Path) -> bool:
+def same_file(one: Path, other: Path) -> bool:
     """Return whether two paths lead to one file, links of both kinds followed; devices and pipes are no files."""
     try:
         first, second = os.stat(one), os.stat(other)

@@ -10,6 +10,7 @@ import typer
 from atg_fg.cli import options
 from atg_fg.cli.camera import BoardDictionary, BoardTag, Columns, Rows, Square
 from atg_fg.cli.lens_options import numbers_of
+from atg_fg.cli.terminal import say
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.storage import plain_files
 
@@ -30,7 +31,8 @@ def cube(
     tag_size: Annotated[float | None, typer.Option(help="Side of a tag, mm; three quarters of the cube's.")] = None,
     paper: Paper = "a4",
     output: Annotated[
-        Path, typer.Option("--output", "-o", help="PDF to cut and glue, or .3mf or .stl for a 3D printer.")
+        Path,
+        typer.Option("--output", "-o", writable=True, help="PDF to cut and glue, or .3mf or .stl for a 3D printer."),
     ] = Path("cube.pdf"),
     seed: Annotated[int, typer.Option(min=0, help="Seed of the draws among which the cubes are chosen.")] = 0,
     json_file: options.JsonFile = None,
@@ -65,10 +67,10 @@ def cube(
     options.write_json({"command": "print cube", **result}, json_file)
     if json_file != "-":
         for number, each in enumerate(chosen):
-            typer.echo(f"cube {number + 1}: tags {' '.join(map(str, each))}")
+            say(f"cube {number + 1}: tags {' '.join(map(str, each))}")
         if cubes > 1:
-            typer.echo(f"told apart after {needed:.2f} actions on average, once all are known")
-        typer.echo(f"saved: {output}, {beside}")
+            say(f"told apart after {needed:.2f} actions on average, once all are known")
+        say(f"saved: {output}, {beside}")
 
 
 @app.command()
@@ -79,7 +81,7 @@ def board(
     tag: BoardTag = 26.0,
     dictionary: BoardDictionary = "5X5_50",
     paper: Paper = "a4",
-    output: Annotated[Path, typer.Option("--output", "-o", help="PDF to write.")] = Path("board.pdf"),
+    output: Annotated[Path, typer.Option("--output", "-o", writable=True, help="PDF to write.")] = Path("board.pdf"),
 ) -> None:
     """Print a board to calibrate a camera with.
 
@@ -91,7 +93,7 @@ def board(
 
     made = CalibrationBoard(columns, rows, square / 1000, tag / 1000, dictionary)
     plain_files.write_bytes_atomically(output, board_sheet(made, paper))
-    typer.echo(f"saved: {output}")
+    say(f"saved: {output}")
 
 
 def _check_pdf(path: Path) -> None:

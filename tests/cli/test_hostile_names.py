@@ -116,9 +116,9 @@ def test_structures_are_told_and_drawn_with_any_names(shown, tmp_path, name):
     file.write_text(renamed(memory, *names))
     for kind in ("png", "svg"):
         drawn = tmp_path / f"structure.{kind}"
-        output = shown("structure", "show", file, "--plot", drawn)
+        output = shown("memory", "structure", file, "--plot", drawn)
         assert all(line in output for line in visible(name, keep="\n").split("\n"))
-        shown("structure", "show", file, "--object", name, "--plot", drawn)
+        shown("memory", "structure", file, "--object", name, "--plot", drawn)
         if kind == "svg":
             ElementTree.fromstring(drawn.read_bytes())
 

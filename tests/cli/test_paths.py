@@ -13,29 +13,34 @@ from atg_fg.cli.paths import IN_PLACE, parameters_of
 OUTPUTS = {
     "ablation": {"json_file", "log", "plot"},
     "bench": {"json_file", "markdown"},
-    "calibrate": {"json_file"},
-    "compare": {"json_file"},
+    "camera calibrate": {"json_file", "output"},
     "demo": {"json_file", "output"},
     "doctor": {"json_file"},
+    "engines check": {"json_file"},
+    "engines compare": {"json_file"},
     "explain": {"json_file"},
     "figure3": {"json_file", "log", "csv_file", "plot"},
     "goal": {"json_file", "records", "video"},
+    "look": {"json_file", "draw"},
     "memory check": {"json_file"},
     "memory compact": {"json_file", "output"},
     "memory diff": {"json_file"},
     "memory duplicates": {"json_file"},
+    "memory example": {"output"},
     "memory export": {"output"},
     "memory import": {"into"},
     "memory merge": {"json_file", "output"},
     "memory show": {"json_file"},
+    "memory structure": {"json_file", "plot"},
     "memory unmerge": set(),
+    "print board": {"output"},
+    "print cube": {"json_file", "output"},
     "replay": set(),
     "report": {"output"},
     "rescore": {"json_file"},
     "sim calibrate": {"json_file", "output"},
     "sim picture": {"output", "film", "table"},
     "sim reliability": {"json_file"},
-    "structure show": {"json_file", "plot"},
     "table1": {"json_file", "records", "save_memories"},
     "trial": {"json_file", "record", "save_memory"},
     "uai export": {"model", "evidence"},
@@ -104,9 +109,15 @@ def test_the_paths_that_a_command_writes_to_are_declared_as_such():
     assert {name: {path.name for path in paths if path.written} for name, paths in PATHS.items()} == OUTPUTS
 
 
-@pytest.mark.parametrize("same", SAME)
-@pytest.mark.parametrize(("name", "one", "other"), PAIRS, ids=map(" ".join, PAIRS))
-def test_one_file_for_two_paths_of_a_command_is_refused_and_stays_as_it_was(tmp_path, refused, name, one, other, same):
+@pytest.mark.parametrize(
+    ("pair", "same"),
+    [(pair, "itself") for pair in PAIRS]
+    # How a path leads to a file is looked at in one place for all pairs.
+    + [(pair, same) for pair in PAIRS[::10] for same in SAME if same != "itself"],
+    ids=str,
+)
+def test_one_file_for_two_paths_of_a_command_is_refused_and_stays_as_it_was(tmp_path, refused, pair, same):
+    name, one, other = pair
     there = tmp_path / "there.json"
     there.write_bytes(b"precious")
     error = refused(*arguments(name, **{one: there, other: SAME[same](there, tmp_path)}))
@@ -118,6 +129,21 @@ def test_one_file_for_two_paths_of_a_command_is_refused_and_stays_as_it_was(tmp_
         ["hard.json", "there.json"],
         ["far"],
     )
+
+
+def test_the_file_beside_what_is_printed_is_no_place_for_another_result(tmp_path, refused):
+    error = refused("print", "cube", "-o", tmp_path / "cube.pdf", "--json", tmp_path / "cube.json")
+    assert "would be overwritten" in error
+
+
+def test_drawings_overwrite_neither_images_nor_each_other(tmp_path, refused):
+    (tmp_path / "a").mkdir()
+    for image in (tmp_path / "one.png", tmp_path / "a" / "one.png"):
+        image.write_bytes(b"precious")
+    assert "overwrite" in refused("look", tmp_path / "one.png", "--draw", tmp_path)
+    drawn = refused("look", tmp_path / "one.png", tmp_path / "a" / "one.png", "--draw", tmp_path / "drawn")
+    assert "overwrite" in drawn
+    assert (tmp_path / "one.png").read_bytes() == b"precious"
 
 
 @pytest.mark.parametrize("end", ["-wal", "-shm", "-journal"])
