@@ -20,8 +20,6 @@ from atg_fg.core.log_math import log_sum_exp, x_log_x
 from atg_fg.core.patterns import Evidence, FloatArray
 from atg_fg.engines.options import number_between, whole_number
 from atg_fg.engines.support import SupportedInference
-from atg_fg.inference.chain import forward_backward
-from atg_fg.inference.expected_entropy import expected_entropies_of
 from atg_fg.inference.interface import TrialSetup
 
 
@@ -106,14 +104,6 @@ class MeanField(SupportedInference):
     def aspect_belief(self) -> FloatArray:
         """q(O) q(X_t), shape [H, W]; after an action, what the next look finds."""
         return self._predicted if self.history.awaits_evidence else np.outer(self.objects, self.aspects)
-
-    def _expected_entropies(self) -> FloatArray:
-        """Return eq. 3 for each action, shape [A], exactly so for q(O) q(X_t)."""
-        return expected_entropies_of(self.model, self.aspect_belief)
-
-    def _smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
-        """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s by forward-backward."""
-        return forward_backward(self.chain(hypothesis))
 
     def _look(self, evidence: Evidence) -> None:
         likelihood = self.model.likelihood(evidence)

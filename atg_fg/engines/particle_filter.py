@@ -12,8 +12,7 @@ from atg_fg.core.patterns import Evidence, FloatArray, IntArray
 from atg_fg.engines.options import whole_number
 from atg_fg.engines.sampling import drawn
 from atg_fg.engines.support import SupportedInference
-from atg_fg.inference.chain import build_chain, forward_backward, forward_pass
-from atg_fg.inference.expected_entropy import expected_entropies_of
+from atg_fg.inference.chain import build_chain, forward_pass
 from atg_fg.inference.history import History
 from atg_fg.inference.interface import TrialSetup
 from atg_fg.inference.recognition_model import COLLECTION, Revelation
@@ -95,14 +94,6 @@ class ParticleFilter(SupportedInference):
             return mass
         predicted: FloatArray = np.matmul(mass[:, None, :], self._transition)[:, 0, :]
         return predicted
-
-    def _expected_entropies(self) -> FloatArray:
-        """Return eq. 3 for each action, shape [A], exactly so for the belief that the particles are."""
-        return expected_entropies_of(self.model, self.aspect_belief)
-
-    def _smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
-        """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s by forward-backward."""
-        return forward_backward(self.chain(hypothesis))
 
     def _look(self, evidence: Evidence) -> None:
         likelihood = self.model.likelihood(evidence)

@@ -11,7 +11,6 @@ from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.patterns import Evidence, FloatArray
 from atg_fg.engines.support import SupportedInference
 from atg_fg.inference.chain import Chain
-from atg_fg.inference.expected_entropy import expected_entropies_of
 from atg_fg.inference.interface import TrialSetup
 
 
@@ -65,10 +64,6 @@ class WholeTrialInference(SupportedInference):
         chain, log_scale = self.chain().scaled()
         identity, joint, log_evidence = self._solve(chain)
         return Posterior(identity, joint, log_evidence + log_scale)
-
-    def _expected_entropies(self) -> FloatArray:
-        """Return eq. 3 for each action, shape [A], exactly so for the engine's own p(O, X_t)."""
-        return expected_entropies_of(self.model, self.aspect_belief)
 
     def _look(self, evidence: Evidence) -> None:
         self._check_possible(self.model.likelihood(evidence))

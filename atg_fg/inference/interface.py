@@ -16,7 +16,8 @@ from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, FloatArray
 from atg_fg.inference.belief_components import BeliefComponent, components_of, shown_patterns_of
 from atg_fg.inference.belief_tree import BeliefNode, TableBeliefNode
-from atg_fg.inference.chain import Chain, build_chain
+from atg_fg.inference.chain import Chain, build_chain, forward_backward
+from atg_fg.inference.expected_entropy import expected_entropies_of
 from atg_fg.inference.history import History
 from atg_fg.inference.recognition_model import RecognitionModel, Revelation
 
@@ -40,8 +41,9 @@ class Inference(ABC):
 
     A subclass is an engine. It says by ``exact`` whether its posteriors are those of the model, and by
     ``knows_structure`` whether it can let objects follow a structure that all share. It answers ``identity`` and
-    ``log_evidence``, and four hooks that are called once what was asked is known to make sense: ``_look``, ``_act``,
-    ``_expected_entropies`` and ``_smoothed_aspects``. Its options are keyword-only arguments of its constructor.
+    ``log_evidence``, and fills the hooks ``_look`` and ``_act``; it may have a way of its own to
+    ``_expected_entropies`` and ``_smoothed_aspects``. Hooks are called once what was asked is known to make sense.
+    Options of an engine are keyword-only arguments of its constructor.
 
     Args:
         setup: What the trial begins with.
@@ -227,13 +229,17 @@ class Inference(ABC):
     def _act(self, action: int) -> None:
         """Predict the effect of an action, the last of ``history``; if this raises, nothing has changed."""
 
-    @abstractmethod
     def _expected_entropies(self) -> FloatArray:
-        """Return E[H(O | z_{t+1}, a, …)] of each action (eq. 3) in nats, shape [A]; called after a look."""
+        """Return E[H(O | z_{t+1}, a, …)] of each action (eq. 3) in nats, shape [A]; called after a look.
 
-    @abstractmethod
+        It is exact for the engine's own ``aspect_belief``; an engine with a way of its own overrides this.
+        """
+        return expected_entropies_of(self.model, self.aspect_belief)
+
     def _smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
         """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s, each of shape [W_s], or zeros.
 
-        Called after the first look, for a hypothesis whose prior probability is above zero.
+        Called after the first look, for a hypothesis whose prior probability is above zero. It is exact, by
+        forward-backward on the trial given the object; an engine with a way of its own overrides this.
         """
+        return forward_backward(self.chain(hypothesis))
