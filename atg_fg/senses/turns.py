@@ -86,6 +86,7 @@ class TurnWatcher:
         patience: How long things take.
 
     Attributes:
+        actions: Names of the actions.
         viewpoint: How the camera looks at the table, as far as is known.
     """
 
@@ -98,6 +99,7 @@ class TurnWatcher:
         self.patience = patience or Patience()
         self.viewpoint = viewpoint or Viewpoint.pitched(USUAL_PITCH)
         self._viewpoint_is_guessed = viewpoint is None
+        self.actions = tuple(actions)
         self._sequences = _shortest_sequences(actions)
         self._forget()
 

@@ -7,6 +7,7 @@ front has the normal −x.
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Final
 
@@ -79,14 +80,21 @@ class CubeBody:
         client: PyBullet's physics client id.
         mass: Kilograms; a cube without one is a picture that nothing moves or touches.
         like: Another cube in the same client, whose textures to take.
+        faces: What the faces may show, RGB, if not the tags 0 to 11 in their order.
     """
 
-    def __init__(self, client: int, mass: float = 0.0, like: CubeBody | None = None) -> None:
+    def __init__(
+        self,
+        client: int,
+        mass: float = 0.0,
+        like: CubeBody | None = None,
+        faces: Sequence[NDArray[np.uint8]] | None = None,
+    ) -> None:
         self.client = client
         # PyBullet reads meshes and textures when they are created; the files are not needed afterwards.
         with tempfile.TemporaryDirectory(prefix="arcube-") as folder:
             self._textures: list[int] = (
-                like._textures if like else [self._load_texture(symbol, Path(folder)) for symbol in range(N_TAGS)]
+                like._textures if like else _load_textures(client, faces or _tagged_faces(), Path(folder))
             )
             meshes = [_write_face(face, Path(folder)) for face in range(len(FACE_NORMALS))]
             shape = pybullet.createVisualShapeArray(
@@ -99,11 +107,6 @@ class CubeBody:
             )
             solid = _solid_box(client) if mass else -1
             self.body = int(pybullet.createMultiBody(mass, solid, shape, physicsClientId=client))
-
-    def _load_texture(self, symbol: int, folder: Path) -> int:
-        path = folder / f"tag{symbol}.png"
-        cv2.imwrite(str(path), face_image(symbol))
-        return int(pybullet.loadTexture(str(path), physicsClientId=self.client))
 
     def show(self, cube: Cube) -> None:
         """Put the tags of ``cube`` on the faces."""
@@ -128,6 +131,19 @@ class CubeBody:
         pybullet.resetBasePositionAndOrientation(
             self.body, position.tolist(), quaternion_of(rotation), physicsClientId=self.client
         )
+
+
+def _tagged_faces() -> list[NDArray[np.uint8]]:
+    return [face_image(symbol) for symbol in range(N_TAGS)]
+
+
+def _load_textures(client: int, faces: Sequence[NDArray[np.uint8]], folder: Path) -> list[int]:
+    textures = []
+    for number, face in enumerate(faces):
+        path = folder / f"face{number}.png"
+        cv2.imwrite(str(path), cv2.cvtColor(face, cv2.COLOR_RGB2BGR))
+        textures.append(int(pybullet.loadTexture(str(path), physicsClientId=client)))
+    return textures
 
 
 def _solid_box(client: int) -> int:
