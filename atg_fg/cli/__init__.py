@@ -29,6 +29,7 @@ COMMANDS: Final = {
     },
     "Camera": {
         "look": "atg_fg.cli.look:look",
+        "live": "atg_fg.cli.live:live",
         "camera": "atg_fg.cli.camera:app",
         "print": "atg_fg.cli.printing:app",
     },

@@ -15,7 +15,7 @@ from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.records import TrialRecord, TrialStep
 from atg_fg.experiments.live_trial import LiveTrial
 from atg_fg.experiments.trial import learn_from
-from atg_fg.policies import Policy
+from atg_fg.policies import ExplorationPolicy, Policy
 from atg_fg.senses.tag_drawing import draw_slots
 from atg_fg.senses.tags import DetectedTag, TagDetector
 from atg_fg.senses.turns import CubeAtRest, CubeTakenAway, TurnWatcher
@@ -76,7 +76,8 @@ class LiveSession:
         policy: Proposes actions.
         engine: Name of the inference engine.
         seed: Of the generators of all trials, from which ties are broken.
-        learns: Whether every trial is learned from; else those are for which ``learn`` is set.
+        learns: Whether every trial is learned from; else those are for which ``learn`` is set. Then actions that were
+            never tried are proposed when the verdict is settled.
         asks: Whether there is someone to ask how the cube was turned; if not, the trial ends where it is not known.
 
     Raises:
@@ -178,7 +179,8 @@ class LiveSession:
             yield from self.end()
         if self._trial is None:
             rng = np.random.default_rng(self._seeds.spawn(1)[0])
-            self._trial = LiveTrial(self.memory, self._parameters, self._engine, self._policy, rng)
+            teaching = ExplorationPolicy() if self.learns else None
+            self._trial = LiveTrial(self.memory, self._parameters, self._engine, self._policy, rng, teaching)
             turn = ()
         elif turn:
             self._trial.acted([self.memory.assumptions.action_index(name) for name in turn])

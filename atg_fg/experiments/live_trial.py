@@ -13,7 +13,7 @@ from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Detection, Evidence
 from atg_fg.core.records import TrialRecord, TrialStep
 from atg_fg.engines import begin_trial
-from atg_fg.policies import Policy
+from atg_fg.policies import Choice, Policy
 
 
 class LiveTrial:
@@ -25,16 +25,23 @@ class LiveTrial:
         engine: Name of the inference engine.
         policy: Proposes actions; it may say that no more are needed.
         rng: The trial's own generator.
+        teaching: Proposes actions when no more are needed for the verdict, so that there is more to learn from.
 
     Attributes:
         record: The trial so far. The action of its last step is the one proposed, until ``acted`` says what was done.
     """
 
     def __init__(
-        self, memory: RobotMemory, parameters: ModelParameters, engine: str, policy: Policy, rng: np.random.Generator
+        self,
+        memory: RobotMemory,
+        parameters: ModelParameters,
+        engine: str,
+        policy: Policy,
+        rng: np.random.Generator,
+        teaching: Policy | None = None,
     ) -> None:
         self._inference = begin_trial(engine, memory, parameters)
-        self._policy, self._rng = policy, rng
+        self._policy, self._rng, self._teaching = policy, rng, teaching
         self.record = TrialRecord(memory.names, memory.assumptions)
 
     def look(self, evidence: Evidence, detection: Detection) -> TrialStep:
@@ -51,6 +58,9 @@ class LiveTrial:
         inference = self._inference
         inference.observe(evidence)
         choice = self._policy.choose(inference, self._rng)
+        if choice.action is None and self._teaching is not None:
+            choice = self._teaching.choose(inference, self._rng)
+            choice = Choice(choice.action, choice.expected_entropies, "learn")
         bound = None if inference.exact else inference.total_variation_bound
         step = TrialStep(
             detection,

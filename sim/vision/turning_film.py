@@ -153,8 +153,9 @@ class TurningFilm:
             stands = ACTION_ROTATIONS[action] @ stands
             yield from self._still(cube, place, skew @ stands, self._rest)
         self._clear()
+        empty = self._shot()
         for _ in range(round(2.5 * self.webcam.rate)):
-            yield self._frame()
+            yield self._finished(empty)
 
     def _put_down(self) -> tuple[FloatArray, FloatArray]:
         """Return where the cube comes to stand, and how far off straight."""
