@@ -196,6 +196,8 @@ def _page(port: int | None, asks: bool, words: queue.Queue[str], stack: ExitStac
 
 def _read_words(words: queue.Queue[str]) -> None:
     """Take in what is typed, line by line; after the last line nobody is there to answer."""
+    from atg_fg.cli.live_teller import NOBODY
+
     for line in sys.stdin:
         words.put(line)
-    words.put("quit")
+    words.put(NOBODY)

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 #: What a person can say besides the names of actions.
 WORDS: Final = ("learn", "new", "quit")
 _NOTHING: Final = "nothing"  # the answer that the cube was not turned
+#: What comes after the last line of input: nobody is there to answer.
+NOBODY: Final = "\x04"
 _SHOWN: Final = 4  # objects on the page
 
 
@@ -58,6 +60,8 @@ class LiveTeller:
         self.trials: list[dict[str, Any]] = []
         self._session: LiveSession | None = None
         self._story: Story | None = None
+        self._early: list[str] = []  # answers given before they were asked for
+        self._is_alone = False
         self._say, self._note, self._quit, self._n_looks = "put a cube before the camera", "", False, 0
         self._step: TrialStep | None = None
 
@@ -92,13 +96,14 @@ class LiveTeller:
                     self._tell_end(event)
                 case Noted():
                     self._note = event.text
-                    self._console.print(f"note: {event.text}", markup=False)
+                    self._console.print(f"note: {event.text}", markup=False, soft_wrap=True)
                 case Asked():
                     self._ask()
 
     def _tell_look(self, event: Looked) -> None:
         assert self._session is not None
         assumptions = self._session.memory.assumptions
+        self._early.clear()
         if self._story is None:
             self._console.print(f"trial {len(self.trials)}", style="bold blue")
             self._story = Story(self._console, self._session.memory)
@@ -112,7 +117,7 @@ class LiveTeller:
         else:
             further = f"; to learn more of it, do: {action}" if action else ": take the cube away, or go on"
             self._say = f"{self._verdict()}{further}"
-            self._console.print(f"  {self._say}", markup=False)
+            self._console.print(f"  {self._say}", markup=False, soft_wrap=True)
         if self._pictures is not None and (picture := self._session.picture) is not None:
             _, png = cv2.imencode(".png", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
             plain_files.write_bytes_atomically(self._pictures / f"look-{self._n_looks:04d}.png", png.tobytes())
@@ -124,7 +129,7 @@ class LiveTeller:
         record = event.record
         self._story.verdict(record)
         if event.learned is not None:
-            self._console.print(f"learned: {event.learned}", markup=False)
+            self._console.print(f"learned: {event.learned}", markup=False, soft_wrap=True)
         self._on_trial(self._session, record, event.learned)
         lines = to_json_lines(record).splitlines()
         self.trials.append(
@@ -158,8 +163,12 @@ class LiveTeller:
             self._tell(self._session.begin_anew())
         elif word == "quit":
             self._quit = True
+        elif word == NOBODY:
+            self._is_alone = True
+        elif word in (*self._session.memory.assumptions.actions, _NOTHING):
+            self._early.append(word)
         elif word:
-            self._console.print(f"{word!r}: expected one of: {', '.join(WORDS)}", markup=False)
+            self._console.print(f"{word!r}: expected one of: {', '.join(WORDS)}", markup=False, soft_wrap=True)
 
     def _ask(self) -> None:
         """Ask how the cube was turned until someone says it."""
@@ -169,7 +178,7 @@ class LiveTeller:
         self._console.print(self._say)
         self._show(answers)
         while True:
-            word = self._words.get().strip().lower()
+            word = self._next_answer()
             if word == "quit":
                 self._quit = True
                 return
@@ -177,7 +186,16 @@ class LiveTeller:
                 turn = None if word == "new" else () if word == _NOTHING else (word,)
                 self._tell(self._session.answer(turn))
                 return
-            self._console.print(f"{word!r}: expected one of: {', '.join(answers)}", markup=False)
+            self._console.print(f"{word!r}: expected one of: {', '.join(answers)}", markup=False, soft_wrap=True)
+
+    def _next_answer(self) -> str:
+        if self._early:
+            return self._early.pop(0)
+        word = "new" if self._is_alone else self._words.get().strip().lower()
+        if word == NOBODY:
+            self._is_alone = True
+            return "new"
+        return word
 
     def _show(self, words: tuple[str, ...] = WORDS) -> None:
         """Bring the page up to date."""

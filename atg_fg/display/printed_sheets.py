@@ -44,6 +44,16 @@ def largest_net(paper: str) -> float:
     return min((width - 2 * _FLAP) / 3, (height - _FLAP) / 4)
 
 
+def net_squares(side: float, paper: str) -> list[tuple[float, float, bool]]:
+    """Return where each face of a net is on its sheet: its lower left corner, mm, and whether it stands on its head.
+
+    Raises:
+        UnknownNameError: There is no such paper.
+    """
+    left, bottom = _middle(paper, 3 * side, 4 * side)
+    return [(left + column * side, bottom + _FLAP / 2 + row * side, on_head) for column, row, on_head in _NET]
+
+
 def cube_sheets(
     cubes: Sequence[Sequence[int]], dictionary: str, side: float, tag_size: float, paper: str = "a4"
 ) -> bytes:
@@ -161,12 +171,11 @@ def _draw_ruler(axes: Axes, width: float) -> None:
 
 def _net_page(title: str, cube: Sequence[int], dictionary: str, side: float, tag_size: float, paper: str) -> Figure:
     figure, axes = _page(title, "cut along full lines, fold along dashed ones, glue the grey flaps", paper)
-    left, bottom = _middle(paper, 3 * side, 4 * side)
-    bottom += _FLAP / 2
+    squares = net_squares(side, paper)
+    left, bottom = squares[_FACES.index("left")][0], squares[_FACES.index("bottom")][1]
     for column, row, edge in _FLAPS:
         _draw_flap(axes, left + column * side, bottom + row * side, side, edge)
-    for face, (column, row, on_head) in enumerate(_NET):
-        x, y = left + column * side, bottom + row * side
+    for face, (x, y, on_head) in enumerate(squares):
         _draw_square(axes, x, y, side, _CUT, "-")
         _draw_face(axes, x, y, side, tag_size, dictionary, cube[face], f"{_FACES[face]} {cube[face]}", on_head)
     # Edges at which two squares meet are folded.

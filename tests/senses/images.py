@@ -46,3 +46,27 @@ def seen(dictionary, tag_id, rotation, position, size=0.05, shape=(480, 640), di
     maps = [part.reshape(shape).astype(np.float32) for part in (column, row)]
     grey = cv2.remap(flat, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT, borderValue=255)
     return np.repeat(grey[:, :, None], 3, axis=2)
+
+
+def cube_picture(faces, cube, dictionary="5X5_50", pitch=40.0, shape=(480, 640), tag_size=0.042, side=0.056):
+    """A cube on a table, RGB: ids on its faces (front, back, left, right, top, bottom) and its rotation on the table.
+
+    The camera looks down by ``pitch`` degrees from 30 cm away.
+    """
+    from atg_fg.senses.viewpoint import Viewpoint
+    from atg_fg.worlds.arcube import FACE_NORMALS
+
+    ups = np.array([[0, 0, 1]] * 4 + [[1, 0, 0], [-1, 0, 0]], dtype=float)
+    from_table = Viewpoint.pitched(pitch).axes.T
+    picture = np.full((*shape, 3), 120, dtype=np.uint8)
+    for tag_id, normal, up in zip(faces, FACE_NORMALS, ups, strict=True):
+        rotation = from_table @ cube @ np.column_stack([np.cross(up, normal), up, normal])
+        position = np.array([0, 0, 0.3]) + side / 2 * rotation[:, 2]
+        if rotation[:, 2] @ position < -0.02:
+            image = seen(dictionary, tag_id, rotation, position, tag_size, shape)
+            square = side / 2 * np.array([[-1, 1, 0], [1, 1, 0], [1, -1, 0], [-1, -1, 0]])
+            corners = (square @ rotation.T + position) @ INTRINSICS.T
+            outline = np.round(corners[:, :2] / corners[:, 2:]).astype(np.int32)
+            inside = cv2.fillConvexPoly(np.zeros(shape, dtype=np.uint8), outline, 1).astype(bool)
+            picture[inside] = image[inside]
+    return picture
