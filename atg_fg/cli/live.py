@@ -24,11 +24,13 @@ from atg_fg.cli.lens_options import (
     lens_of,
     tags_of,
 )
+from atg_fg.cli.paths import same_file
+from atg_fg.cli.terminal import say
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.patterns import PatternAlphabet
-from atg_fg.core.records import Experiment, StoredTrial, TrialRecord
+from atg_fg.core.records import Experiment, TrialRecord, TrialSummary
 from atg_fg.core.version import __version__
 from atg_fg.learning.structured_memory import memory_for
 from atg_fg.policies import make_policy
@@ -60,7 +62,10 @@ def live(
         float | None, typer.Option(help="How far the camera looks down, degrees; found out if not given.")
     ] = None,
     memory: Annotated[
-        Path | None, typer.Option(help="Memory file (JSON or .db); made if it is not there. In mind only if not given.")
+        Path | None,
+        typer.Option(
+            writable=True, help="Memory file (JSON or .db); made if it is not there. In mind only if not given."
+        ),
     ] = None,
     learn: Annotated[
         bool, typer.Option("--learn", help="Learn from every trial, not from those asked for only.")
@@ -88,7 +93,9 @@ def live(
             help="Serve a page on this port; 0 for a free one. Opened by itself where there is a screen.",
         ),
     ] = None,
-    draw: Annotated[Path | None, typer.Option(help="Folder for a picture of each look with the tags drawn in.")] = None,
+    draw: Annotated[
+        Path | None, typer.Option(writable=True, help="Folder for a picture of each look with the tags drawn in.")
+    ] = None,
     timeout: Annotated[float, typer.Option(help="Seconds that a frame may take.")] = 10.0,
     seed: options.Seed = 0,
     json_file: options.JsonFile = None,
@@ -106,6 +113,12 @@ def live(
     if len(given) != 1:
         raise InvalidInputError(f"live: {len(given)} sources of frames; expected one of --camera, --video and --images")
     options.check_json_option(json_file)
+    # A video may be an address, so that it is no path to the check that all commands share.
+    for option, output in (("--json", json_file), ("--memory", memory)):
+        if video is not None and output is not None and same_file(Path(output), Path(video)):
+            raise InvalidInputError(
+                f"{option}: {output} is the file of --video too, and would be overwritten; expected another file"
+            )
     if draw is not None:
         plain_files.make_folder(draw)
     known = tags_of(tags, dictionary, tag_size)
@@ -150,7 +163,7 @@ def live(
         def keep(session: LiveSession, record: TrialRecord, learned: str | None) -> None:
             if memory is not None and learned is not None:
                 experiment = Experiment("live", about, seed, __version__)
-                save_trial(session.memory, memory, StoredTrial.of(record, learned), experiment)
+                save_trial(session.memory, memory, TrialSummary.of(record, learned), experiment)
 
         words: queue.Queue[str] = queue.Queue()
         console = options.console(json_file)
@@ -164,7 +177,7 @@ def live(
         teller.run(frames)
         options.write_json({"command": "live", "trials": teller.trials}, json_file)
     if memory is not None and json_file != "-":
-        typer.echo(f"memory: {memory}, {len(remembered)} objects")
+        say(f"memory: {memory}, {len(remembered)} objects")
 
 
 def _memory(path: Path | None, tags: CubeTags, n_objects: int | None) -> RobotMemory:

@@ -96,7 +96,7 @@ class LiveTeller:
                     self._tell_end(event)
                 case Noted():
                     self._note = event.text
-                    self._console.print(f"note: {event.text}", markup=False, soft_wrap=True)
+                    self._console.print(f"note: {event.text}", soft_wrap=True)
                 case Asked():
                     self._ask()
 
@@ -117,7 +117,7 @@ class LiveTeller:
         else:
             further = f"; to learn more of it, do: {action}" if action else ": take the cube away, or go on"
             self._say = f"{self._verdict()}{further}"
-            self._console.print(f"  {self._say}", markup=False, soft_wrap=True)
+            self._console.print(f"  {self._say}", soft_wrap=True)
         if self._pictures is not None and (picture := self._session.picture) is not None:
             _, png = cv2.imencode(".png", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
             plain_files.write_bytes_atomically(self._pictures / f"look-{self._n_looks:04d}.png", png.tobytes())
@@ -129,7 +129,7 @@ class LiveTeller:
         record = event.record
         self._story.verdict(record)
         if event.learned is not None:
-            self._console.print(f"learned: {event.learned}", markup=False, soft_wrap=True)
+            self._console.print(f"learned: {event.learned}", soft_wrap=True)
         self._on_trial(self._session, record, event.learned)
         lines = to_json_lines(record).splitlines()
         self.trials.append(
@@ -168,7 +168,7 @@ class LiveTeller:
         elif word in (*self._session.memory.assumptions.actions, _NOTHING):
             self._early.append(word)
         elif word:
-            self._console.print(f"{word!r}: expected one of: {', '.join(WORDS)}", markup=False, soft_wrap=True)
+            self._console.print(f"{word!r}: expected one of: {', '.join(WORDS)}", soft_wrap=True)
 
     def _ask(self) -> None:
         """Ask how the cube was turned until someone says it."""
@@ -186,7 +186,7 @@ class LiveTeller:
                 turn = None if word == "new" else () if word == _NOTHING else (word,)
                 self._tell(self._session.answer(turn))
                 return
-            self._console.print(f"{word!r}: expected one of: {', '.join(answers)}", markup=False, soft_wrap=True)
+            self._console.print(f"{word!r}: expected one of: {', '.join(answers)}", soft_wrap=True)
 
     def _next_answer(self) -> str:
         if self._early:

@@ -204,6 +204,8 @@ def test_bad_input_is_one_line(refused, tmp_path, tags, pictures):
     assert "no images in this folder" in refused("live", "--images", tmp_path / "empty", *tags)
     assert "no such file; expected a video" in refused("live", "--video", "nowhere.avi", *tags)
     assert "2 sources of frames; expected one of" in refused("live", "--camera", 0, "--video", video, *tags)
+    over = refused("live", "--video", video, *tags, "--json", video)
+    assert "is the file of --video too, and would be overwritten" in over
     assert "0 sources of frames" in refused("live", *tags)
     assert "live: no tags; expected --tags FILE" in refused("live", "--video", video)
     assert "unknown name 'nope'" in refused("live", "--video", video, "--dictionary", "nope")

@@ -21,6 +21,7 @@ OUTPUTS = {
     "explain": {"json_file"},
     "figure3": {"json_file", "log", "csv_file", "plot"},
     "goal": {"json_file", "records", "video"},
+    "live": {"json_file", "memory", "draw"},
     "look": {"json_file", "draw"},
     "memory check": {"json_file"},
     "memory compact": {"json_file", "output"},
