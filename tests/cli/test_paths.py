@@ -31,6 +31,7 @@ OUTPUTS = {
     "memory export": {"output"},
     "memory import": {"into"},
     "memory merge": {"json_file", "output"},
+    "memory repair": {"json_file"},
     "memory show": {"json_file"},
     "memory structure": {"json_file", "plot"},
     "memory unmerge": set(),
