@@ -13,6 +13,7 @@ from urllib.parse import quote
 
 from atg_fg.core.errors import BusyMemoryError, InvalidInputError
 from atg_fg.storage.database import schema
+from atg_fg.storage.database.distrust import DistrustfulConnection
 from atg_fg.storage.plain_files import starts_with
 
 #: Seconds that a writer waits for another one to end its transaction.
@@ -20,10 +21,6 @@ WAIT: Final = 5.0
 
 
 _MAGIC: Final = b"SQLite format 3\0"
-
-
-#: No text in a memory is longer; a damaged file may say so.
-_MAX_BYTES: Final = 2**26
 
 
 _WRITING_FAILED: Final = (
@@ -61,6 +58,10 @@ def translated(place: Path | str) -> Iterator[None]:
         if code == sqlite3.SQLITE_CANTOPEN:
             raise InvalidInputError(
                 f"{place}: cannot be opened: {error}; expected a path in a folder that can be written"
+            ) from error
+        if code == sqlite3.SQLITE_INTERRUPT:
+            raise InvalidInputError(
+                f"{place}: damaged: to read it takes more work than its size explains, so it was ended"
             ) from error
         raise InvalidInputError(f"{place}: damaged, or not a memory of atg-fg: {error}") from error
     except (OverflowError, UnicodeError) as error:
@@ -174,18 +175,15 @@ def roll_back(connection: sqlite3.Connection) -> None:
 
 def _connected(path: Path | str, mode: str, wait: float = WAIT) -> sqlite3.Connection:
     uri = f"file:{quote(str(Path(path).absolute()))}?{mode}"
-    connection = sqlite3.connect(uri, uri=True, timeout=wait, isolation_level=None)
-    connection.setlimit(sqlite3.SQLITE_LIMIT_LENGTH, _MAX_BYTES)
-    connection.execute("PRAGMA foreign_keys = ON")
-    # The file may come from anywhere: what it defines must not reach beyond it.
-    connection.execute("PRAGMA trusted_schema = OFF")
-    connection.execute("PRAGMA cell_size_check = ON")
+    connection = sqlite3.connect(uri, uri=True, timeout=wait, isolation_level=None, factory=DistrustfulConnection)
+    connection.distrust(path)
     return connection
 
 
 def _migrated_copy(connection: sqlite3.Connection, path: Path | str) -> sqlite3.Connection:
     """Return a copy in RAM with the present tables, since whoever reads must not write."""
-    copy = sqlite3.connect(":memory:", isolation_level=None)
+    copy = sqlite3.connect(":memory:", isolation_level=None, factory=DistrustfulConnection)
+    copy.distrust(path)
     connection.backup(copy)
     connection.close()
     with written(copy):

@@ -102,7 +102,14 @@ def _add_transitions(
     connection: sqlite3.Connection, graphs: dict[Any, dict[str, Any]], actions: list[Any], place: str
 ) -> None:
     rows = connection.execute("SELECT graph, source, action, target, count FROM transitions ORDER BY 1, 2, 3, 4")
+    last: tuple[Any, ...] = ()
     for graph, source, action, target, count in rows:
+        here = tuple(
+            whole_number(number, f"{place}: transitions", least=0) for number in (graph, source, action, target)
+        )
+        if here <= last:  # pages of a damaged file may lead around in a circle
+            raise InvalidInputError(f"{place}: transitions: {here} after {last}; expected them in ascending order")
+        last = here
         transitions = _of(graphs, graph, f"{place}: transitions")["transitions"]
         where = f"{place}: {graphs[graph]['name']!r}: transitions[{len(transitions)}].action"
         if whole_number(action, where, least=0) >= len(actions):

@@ -7,6 +7,8 @@ this project has written files with it; a new one is added at the end.
 from __future__ import annotations
 
 import sqlite3
+from contextlib import closing
+from functools import cache
 from typing import Final
 
 from atg_fg.core.errors import InvalidInputError
@@ -60,9 +62,24 @@ MIGRATIONS: tuple[tuple[str, ...], ...] = (_VERSION_1,)
 def version_of(connection: sqlite3.Connection, place: str) -> int:
     """Return the version of a file, 0 if nothing was ever written to it.
 
+    What a file defines is compared with what this project would have defined, text by text, before anything is read
+    from it: a trigger or a view of a stranger's would run with each statement.
+
     Raises:
-        InvalidInputError: It belongs to another application, or to a later version of this one.
+        InvalidInputError: It belongs to another application or to a later version of this one, or it defines
+            something else.
     """
+    if connection.in_transaction:
+        return _version_of(connection, place)
+    connection.execute("BEGIN")  # all of it as it is at one moment
+    try:
+        return _version_of(connection, place)
+    finally:
+        if connection.in_transaction:
+            connection.execute("ROLLBACK")
+
+
+def _version_of(connection: sqlite3.Connection, place: str) -> int:
     (application,) = connection.execute("PRAGMA application_id").fetchone()
     (version,) = connection.execute("PRAGMA user_version").fetchone()
     (tables,) = connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
@@ -77,7 +94,31 @@ def version_of(connection: sqlite3.Connection, place: str) -> int:
         raise InvalidInputError(
             f"{place}: schema version {version}, of a later atg-fg; expected at most {len(MIGRATIONS)}"
         )
+    _check_definitions(connection, int(version), place)
     return int(version)
+
+
+def _check_definitions(connection: sqlite3.Connection, version: int, place: str) -> None:
+    found, expected = _definitions(connection), _definitions_of(MIGRATIONS[:version])
+    for kind, name, _, text in sorted(found ^ expected, key=repr):
+        what = f"defines {kind} {name!r}, {text!r}" if (kind, name, _, text) in found else f"no such {kind}: {name}"
+        raise InvalidInputError(
+            f"{place}: {what}; expected a memory of atg-fg, with its tables and indices and nothing else"
+        )
+
+
+def _definitions(connection: sqlite3.Connection) -> frozenset[tuple[object, ...]]:
+    return frozenset(connection.execute("SELECT type, name, tbl_name, sql FROM sqlite_master").fetchall())
+
+
+@cache
+def _definitions_of(steps: tuple[tuple[str, ...], ...]) -> frozenset[tuple[object, ...]]:
+    """Return what a file defines that has gone through these steps."""
+    with closing(sqlite3.connect(":memory:")) as connection:
+        for step in steps:
+            for statement in step:
+                connection.execute(statement)
+        return _definitions(connection)
 
 
 def migrate(connection: sqlite3.Connection, place: str) -> None:
