@@ -30,21 +30,8 @@ from pathlib import Path
 
 import numpy as np
 
-from atg_fg.core.aspect_graph import COLLECTION_NODE, AspectTransitionGraph
-from atg_fg.core.assumptions import arcube_assumptions
-from atg_fg.core.memory import RobotMemory
-from atg_fg.core.records import TrialRecord
+import atg_fg as atg
 from atg_fg.display.figures import GREY, PALETTE, figure_class, plot_style
-from atg_fg.display.trial_plots import plot_atg
-from atg_fg.engines import begin_trial
-from atg_fg.experiments.trial import learn_from, run_trial
-from atg_fg.policies import make_policy
-from atg_fg.storage.memory_files import load_memory, save_memory
-from atg_fg.storage.memory_json import memory_to_json
-from atg_fg.storage.presets import preset
-from atg_fg.worlds.arcube import ACTION_SOURCES, make_arcubes
-from atg_fg.worlds.base import World
-from atg_fg.worlds.registry import make_world
 
 # %% [markdown]
 # ## An ARcube
@@ -55,8 +42,9 @@ from atg_fg.worlds.registry import make_world
 # the top face to the front, *left* and *right* turn a side face to the front.
 
 # %%
-cubes = make_arcubes(100, seed=0)
-camera_world = make_world("rendered", cubes=cubes).unwrapped
+cubes = atg.make_arcubes(100, seed=0)
+assumptions = atg.arcube_assumptions(n_objects=100)
+camera_world = atg.make_world("rendered", cubes=cubes).unwrapped
 
 # After the world, which imports the simulator without its banner.
 from sim.bodies.cube import tag_image
@@ -67,13 +55,14 @@ def seen_after(action: str | None) -> np.ndarray:
     """Return the camera frame of cube 0, upright and then turned by one action, with its detections."""
     camera_world.reset(seed=0, options={"object": 0, "orientation": 0})
     if action is not None:
-        camera_world.step(np.int64(list(ACTION_SOURCES).index(action)))
+        camera_world.step(np.int64(assumptions.action_index(action)))
     return draw_detections(camera_world.frame, camera_world.markers)
 
 
+# %%
 with plot_style():
     figure = figure_class()(figsize=(10, 2.3), layout="constrained")
-    for axes, action in zip(figure.subplots(1, 4), (None, *ACTION_SOURCES), strict=True):
+    for axes, action in zip(figure.subplots(1, 4), (None, *assumptions.actions), strict=True):
         axes.imshow(seen_after(action))
         axes.set_title(action or "upright")
         axes.set_axis_off()
@@ -87,7 +76,6 @@ figure
 # (six faces can be in front, and four of the others on top), three actions, and $12 \cdot 11 = 132$ patterns.
 
 # %%
-assumptions = arcube_assumptions(n_objects=100)
 print(f"|O| = {assumptions.n_objects}, |G| = {assumptions.n_aspects}, |Z| = {len(assumptions.alphabet)} patterns")
 print("actions:", ", ".join(assumptions.actions))
 
@@ -99,17 +87,17 @@ print("actions:", ", ".join(assumptions.actions))
 # an aspect of one object; the actions are random. One trial of 6 actions with cube 0, seed 0:
 
 # %%
-world = make_world("ideal", cubes=cubes)
+world = atg.make_world("ideal", cubes=cubes)
 
 
-def explore(world: World, memory: RobotMemory, cube: int, n_actions: int, seed: int) -> TrialRecord:
+def explore(world, memory: atg.RobotMemory, cube: int, n_actions: int, seed: int) -> atg.TrialRecord:
     """Turn one cube over at random."""
-    inference = begin_trial("bayes-filter", memory, preset("default"))
+    inference = atg.begin_trial("bayes-filter", memory, atg.preset("default"))
     rng = np.random.default_rng(seed)
-    return run_trial(world, inference, make_policy("random"), n_actions, rng, reset_options={"object": cube})
+    return atg.run_trial(world, inference, atg.make_policy("random"), n_actions, rng, reset_options={"object": cube})
 
 
-memory = RobotMemory(assumptions)
+memory = atg.RobotMemory(assumptions)
 record = explore(world, memory, cube=0, n_actions=6, seed=0)
 record
 
@@ -117,7 +105,7 @@ record
 # What was learned from it: a row for each known aspect, and where each action led from there.
 
 # %%
-name = learn_from(record, memory)
+name = atg.learn_from(record, memory)
 graph = memory[name]
 graph
 
@@ -132,7 +120,7 @@ memory
 # in an aspect; it is drawn to the collection node, but may lead to an aspect that is known already, too.
 
 # %%
-plot_atg(graph, symbol_images={symbol: tag_image(symbol) for symbol in range(12)})
+atg.plot_atg(graph, symbol_images={symbol: tag_image(symbol) for symbol in range(12)})
 
 # %% [markdown]
 # ## The same as a networkx graph
@@ -142,7 +130,6 @@ plot_atg(graph, symbol_images={symbol: tag_image(symbol) for symbol in range(12)
 # %%
 view = graph.to_networkx()
 print(f"{view}, of them {sum(not data['observed'] for *_, data in view.edges(data=True))} unknown transitions")
-print(f"{COLLECTION_NODE}: {view.nodes[COLLECTION_NODE]}")
 for source, target, data in view.edges(data=True):
     if data["observed"]:
         print(f"{view.nodes[source]['pattern']} --{data['action']}--> {view.nodes[target]['pattern']}: {data['count']}")
@@ -158,9 +145,9 @@ for source, target, data in view.edges(data=True):
 N_RUNS, N_ACTIONS = 40, 120
 
 
-def growth(record: TrialRecord) -> list[tuple[int, int]]:
+def growth(record: atg.TrialRecord) -> list[tuple[int, int]]:
     """Return the known aspects and the known (aspect, action) pairs after each look."""
-    grown = AspectTransitionGraph("growing", assumptions)
+    grown = atg.AspectTransitionGraph("growing", assumptions)
     counts = []
     for time in range(len(record.patterns)):
         first = max(time - 1, 0)
@@ -169,7 +156,7 @@ def growth(record: TrialRecord) -> list[tuple[int, int]]:
     return counts
 
 
-runs = np.array([growth(explore(world, RobotMemory(assumptions), run, N_ACTIONS, run)) for run in range(N_RUNS)])
+runs = np.array([growth(explore(world, atg.RobotMemory(assumptions), run, N_ACTIONS, run)) for run in range(N_RUNS)])
 runs.shape
 
 # %%
@@ -207,6 +194,7 @@ for actions in (10, 30, 120):
 
 # %%
 with tempfile.TemporaryDirectory() as folder:
-    save_memory(memory, Path(folder) / "memory.json")
-    assert load_memory(Path(folder) / "memory.json") == memory
-print("\n".join(memory_to_json(memory).splitlines()[:14]))
+    atg.save_memory(memory, Path(folder) / "memory.json")
+    assert atg.load_memory(Path(folder) / "memory.json") == memory
+    text = (Path(folder) / "memory.json").read_text()
+print("\n".join(text.splitlines()[:14]))

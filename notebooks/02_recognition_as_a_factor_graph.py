@@ -31,17 +31,9 @@ import time
 
 import numpy as np
 
-from atg_fg.core.assumptions import arcube_assumptions
-from atg_fg.core.memory import RobotMemory
-from atg_fg.core.parameters import ModelParameters
-from atg_fg.core.patterns import Evidence
+import atg_fg as atg
 from atg_fg.display.figures import PALETTE, figure_class, plot_style
-from atg_fg.display.trial_plots import plot_belief, plot_entropy
-from atg_fg.engines import begin_trial
-from atg_fg.experiments.trial import run_trial
 from atg_fg.inference.gtsam_factors import object_key
-from atg_fg.policies import make_policy
-from atg_fg.worlds.registry import make_world
 
 # %% [markdown]
 # ## Three look-alikes and a small memory
@@ -52,13 +44,13 @@ from atg_fg.worlds.registry import make_world
 
 # %%
 cubes = ((0, 1, 2, 3, 4, 5), (0, 1, 2, 3, 5, 4), (0, 2, 1, 3, 4, 5))
-assumptions = arcube_assumptions(n_objects=4)
-memory = RobotMemory(assumptions)
-ideal = make_world("ideal", cubes=cubes)
+assumptions = atg.arcube_assumptions(n_objects=4)
+memory = atg.RobotMemory(assumptions)
+ideal = atg.make_world("ideal", cubes=cubes)
 for cube in range(3):
-    inference = begin_trial("bayes-filter", RobotMemory(assumptions), ModelParameters())
+    inference = atg.begin_trial("bayes-filter", atg.RobotMemory(assumptions), atg.ModelParameters())
     rng = np.random.default_rng(cube)
-    record = run_trial(ideal, inference, make_policy("random"), 12, rng, reset_options={"object": cube})
+    record = atg.run_trial(ideal, inference, atg.make_policy("random"), 12, rng, reset_options={"object": cube})
     memory.learn(record.patterns, record.actions, matched=None)
 memory
 
@@ -70,11 +62,11 @@ memory
 # $X_s$ are those of the ATGs. The robot takes the action of least expected entropy, five times.
 
 # %%
-parameters = ModelParameters(transition_concentration=0.1, observation_noise=0.1, learn_in_trial=False)
-world = make_world("ideal", cubes=cubes, slip=0.1, wrong=0.2)
-inference = begin_trial("gtsam", memory, parameters)
+parameters = atg.ModelParameters(transition_concentration=0.1, observation_noise=0.1, learn_in_trial=False)
+world = atg.make_world("ideal", cubes=cubes, slip=0.1, wrong=0.2)
+inference = atg.begin_trial("gtsam", memory, parameters)
 rng = np.random.default_rng(0)
-record = run_trial(world, inference, make_policy("entropy"), 5, rng, reset_options={"object": 1})
+record = atg.run_trial(world, inference, atg.make_policy("entropy"), 5, rng, reset_options={"object": 1})
 for number, step in enumerate(record.steps):
     remarks = [f"wrong, should be {step.truth['pattern']}"] * (step.detection != step.truth["pattern"])
     remarks += ["the action had failed"] * step.truth["slipped"]
@@ -107,7 +99,7 @@ for index in range(graph.graph.size()):
 # %%
 def identity_by(engine: str) -> np.ndarray:
     """Return p(O | z, a) of the recorded trial by another engine."""
-    other = begin_trial(engine, memory, parameters)
+    other = atg.begin_trial(engine, memory, parameters)
     for evidence, action in zip(inference.history.evidence, [*inference.history.actions, None], strict=True):
         other.observe(evidence)
         if action is not None:
@@ -116,6 +108,7 @@ def identity_by(engine: str) -> np.ndarray:
     return np.append(belief.objects, belief.unseen)
 
 
+# %%
 eliminated = np.append(graph.identity().objects, graph.identity().unseen)
 posteriors = {
     "whole graph, eliminated": eliminated,
@@ -136,7 +129,7 @@ for name, posterior in posteriors.items():
 # and the last look restores it. One trial, seed 0; the posterior is exact, so there is no interval to give.
 
 # %%
-plot_belief(record)
+atg.plot_belief(record)
 
 # %%
 inference.belief_table()
@@ -153,7 +146,7 @@ inference.belief_table()
 truth = memory["object-001"]
 position = memory.names.index("object-001")
 prefixes = []
-prefix = begin_trial("gtsam", memory, parameters)
+prefix = atg.begin_trial("gtsam", memory, parameters)
 for evidence, action in zip(inference.history.evidence, [*inference.history.actions, None], strict=True):
     prefix.observe(evidence)
     prefixes.append(prefix.graph())
@@ -206,7 +199,7 @@ for s in range(6):
 # %%
 model = inference.model
 patterns = np.eye(len(assumptions.alphabet))
-observations = np.array([model.likelihood(Evidence.of_likelihood(assumptions.alphabet, row)) for row in patterns])
+observations = np.array([model.likelihood(atg.Evidence.of_likelihood(assumptions.alphabet, row)) for row in patterns])
 hypothetical = graph.copy()
 hypothetical.act(model.transition(assumptions.action_index("flip")))
 hypothetical.observe(observations[0])
@@ -244,4 +237,4 @@ print(f"the straightforward way takes about {straightforward_time / engine_time:
 # Expected entropy is an average over what may be seen; the entropy that follows lies above or below it.
 
 # %%
-plot_entropy(record)
+atg.plot_entropy(record)

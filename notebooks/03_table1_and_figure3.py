@@ -29,19 +29,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from atg_fg.core.aspect_graph import AspectTransitionGraph
-from atg_fg.core.assumptions import arcube_assumptions
-from atg_fg.core.memory import RobotMemory
-from atg_fg.core.parameters import ModelParameters
-from atg_fg.core.patterns import Evidence
-from atg_fg.core.records import TrialRecord
+import atg_fg as atg
 from atg_fg.display.figures import GREY, PALETTE, figure_class, plot_style
-from atg_fg.display.success_plots import plot_success
-from atg_fg.engines import begin_trial
 from atg_fg.experiments.figure3 import figure3_points
-from atg_fg.experiments.scores import TestResult, pooled_interval, summarise
-from atg_fg.experiments.table1 import TestPlan, run_test, run_tests
-from atg_fg.storage.presets import preset
+from atg_fg.experiments.scores import pooled_interval, summarise
 
 # %% [markdown]
 # ## Table 1
@@ -57,13 +48,13 @@ SEEDS = range(3)
 PAPER = {"identification": 0.816, "recognition": 0.907, "success": 0.792}
 
 
-def tests_of(parameters: ModelParameters, seeds: range) -> list[TestResult]:
+def tests_of(parameters: atg.ModelParameters, seeds: range) -> list[atg.TestResult]:
     """Run one test of 100 trials for each seed."""
-    plan = TestPlan(engine="bayes-filter", parameters=parameters)
-    return list(run_tests([(plan, seed) for seed in seeds], jobs=1))
+    plan = atg.TestPlan(engine="bayes-filter", parameters=parameters)
+    return list(atg.run_tests([(plan, seed) for seed in seeds], jobs=1))
 
 
-table1 = {name: tests_of(preset(name), SEEDS) for name in ("paper", "default")}
+table1 = {name: tests_of(atg.preset(name), SEEDS) for name in ("paper", "default")}
 for name, tests in table1.items():
     print(f"preset {name}")
     for test in tests:
@@ -100,9 +91,9 @@ for score, printed in PAPER.items():
 # trials a point (seeds 0 and 1), where the paper has 10. All of it, for 4 to 20 actions: `atg-fg figure3`.
 
 # %%
-plan = TestPlan(engine="bayes-filter", parameters=preset("paper"))
+plan = atg.TestPlan(engine="bayes-filter", parameters=atg.preset("paper"))
 points = figure3_points(plan, actions=(4, 8, 12, 16), policies=("entropy", "random"), seeds=(0, 1), jobs=1)
-plot_success(points, title="Success by actions, preset paper (2 tests a point)")
+atg.plot_success(points, title="Success by actions, preset paper (2 tests a point)")
 
 # %%
 for point in points:
@@ -119,7 +110,7 @@ for point in points:
 # %%
 NOISES = (1e-12, 1e-10, 1e-8, 1e-6, 1e-4, 1e-2)
 success = {
-    learn: {noise: tests_of(ModelParameters(noise, noise, learn_in_trial=learn), range(2)) for noise in NOISES}
+    learn: {noise: tests_of(atg.ModelParameters(noise, noise, learn_in_trial=learn), range(2)) for noise in NOISES}
     for learn in (False, True)
 }
 for learn, by_noise in success.items():
@@ -164,27 +155,29 @@ figure
 # wrong verdict by $\ln(1/\varepsilon) / \ln 132$ looks, about 4 for $10^{-8}$, and no more.
 
 # %%
-assumptions = arcube_assumptions(n_objects=100)
+assumptions = atg.arcube_assumptions(n_objects=100)
 p, v, x, y = (0, 1), (2, 3), (4, 5), (6, 5)  # patterns (front, top)
-wrong = AspectTransitionGraph("wrong", assumptions)
+wrong = atg.AspectTransitionGraph("wrong", assumptions)
 for pattern in (p, v, x, y):
     wrong.add_aspect(pattern)
 flip, left, right = range(3)
 for source, action, target in ((0, flip, 1), (2, left, 3), (3, right, 2)):
     wrong.add_transition(source, action, target)
-memory = RobotMemory(assumptions, [wrong])
+memory = atg.RobotMemory(assumptions, [wrong])
+wrong
 
 
-def to_and_fro(parameters: ModelParameters, n_looks: int) -> list[float]:
+# %%
+def to_and_fro(parameters: atg.ModelParameters, n_looks: int) -> list[float]:
     """Return the probability of the wrong ATG after the contradiction and after each look that follows."""
-    inference = begin_trial("gtsam", memory, parameters)
-    inference.observe(Evidence.of_detection(assumptions.alphabet, p))
+    inference = atg.begin_trial("gtsam", memory, parameters)
+    inference.observe(atg.Evidence.of_detection(assumptions.alphabet, p))
     inference.act(flip)
-    inference.observe(Evidence.of_detection(assumptions.alphabet, x))
+    inference.observe(atg.Evidence.of_detection(assumptions.alphabet, x))
     beliefs = [inference.identity().objects[0]]
     for look in range(n_looks):
         inference.act(right if look % 2 else left)
-        inference.observe(Evidence.of_detection(assumptions.alphabet, x if look % 2 else y))
+        inference.observe(atg.Evidence.of_detection(assumptions.alphabet, x if look % 2 else y))
         beliefs.append(inference.identity().objects[0])
     return [float(belief) for belief in beliefs]
 
@@ -195,7 +188,7 @@ with plot_style():
     figure = figure_class()(figsize=(7.2, 3.9), layout="constrained")
     axes = figure.subplots()
     for noise, color in zip((1e-4, 1e-8, 1e-12), PALETTE, strict=False):
-        fixed = ModelParameters(noise, noise, learn_in_trial=False)
+        fixed = atg.ModelParameters(noise, noise, learn_in_trial=False)
         axes.plot(to_and_fro(fixed, N_LOOKS), color=color, marker="o", label=f"fixed, α = δ = {noise:.0e}")
         learning = to_and_fro(replace(fixed, learn_in_trial=True), N_LOOKS)
         axes.plot(learning, color=color, linestyle="dashed", marker="s", label=f"learning, α = δ = {noise:.0e}")
@@ -219,18 +212,29 @@ figure
 
 
 # %%
-def repeats(record: TrialRecord) -> float:
+def repeats(record: atg.TrialRecord) -> float:
     """Return the share of a trial's actions that repeat a transition of the same trial."""
     transitions = list(zip(record.patterns, record.actions, record.patterns[1:], strict=False))
     return 1 - len(set(transitions)) / len(transitions)
 
 
-lines = []
+shares_of = {}
 for name, policy in (("paper", "entropy"), ("paper", "random"), ("default", "entropy")):
     shares: list[float] = []
-    plan = TestPlan(engine="bayes-filter", policy=policy, parameters=preset(name))
+    plan = atg.TestPlan(engine="bayes-filter", policy=policy, parameters=atg.preset(name))
     for seed in (0, 1):
-        run_test(plan, seed, on_trial=lambda _, record, shares=shares: shares.append(repeats(record)))
-    half = 1.96 * np.std(shares, ddof=1) / np.sqrt(len(shares))
-    lines.append(f"preset {name:8} policy {policy:8} {np.mean(shares):.1%} ± {half:.1%}")
-print("\n".join(lines))
+        atg.run_test(plan, seed, on_trial=lambda _, record, shares=shares: shares.append(repeats(record)))
+    shares_of[f"preset {name}, {policy} policy"] = shares
+
+# %%
+with plot_style():
+    figure = figure_class()(figsize=(7.2, 1.9), layout="constrained")
+    axes = figure.subplots()
+    for row, shares in enumerate(shares_of.values()):
+        mean, half = 100 * np.mean(shares), 196 * np.std(shares, ddof=1) / np.sqrt(len(shares))
+        axes.errorbar(mean, row, xerr=half, fmt="o", color=PALETTE[row])
+        axes.text(mean, row - 0.25, f"{mean:.1f} ± {half:.1f} %", color=PALETTE[row], ha="center")
+    axes.set_yticks(range(len(shares_of)), shares_of)
+    axes.set(ylim=(2.5, -0.7), xlim=(-1, 24), xlabel="actions that repeat a transition (%)")
+    axes.set_title("Repeated transitions in a trial")
+figure

@@ -23,10 +23,9 @@
 # %%
 import numpy as np
 
-from atg_fg.core.parameters import ModelParameters
-from atg_fg.core.patterns import Evidence
+import atg_fg as atg
+from atg_fg.core.statistics import wilson_interval
 from atg_fg.display.figures import GREY, PALETTE, figure_class, plot_style
-from atg_fg.engines import begin_trial
 from atg_fg.experiments.engine_comparison import ComparisonPlan
 from atg_fg.inference.explanations import best_explanations, sample_explanations, surprise
 from atg_fg.inference.smoothing import pattern_marginals, smoothed_patterns
@@ -39,22 +38,24 @@ from atg_fg.inference.smoothing import pattern_marginals, smoothed_patterns
 # some noise.
 
 # %%
-parameters = ModelParameters(transition_concentration=0.05, observation_noise=0.05, learn_in_trial=False)
+parameters = atg.ModelParameters(transition_concentration=0.05, observation_noise=0.05, learn_in_trial=False)
 plan = ComparisonPlan(n_objects=10, n_remembered=3, n_learning_actions=20, parameters=parameters)
 memory = plan.learned_memory(np.random.default_rng(0))
 graph = memory[memory.names[0]]
 patterns = memory.assumptions.alphabet.patterns
-known = list(graph.pattern_indices)
-#: A walk along counted edges, always the first that leads to another aspect.
+known = [patterns[index] for index in graph.pattern_indices]
+# A walk along counted edges, always the first that leads to another aspect.
 path, actions = [0], []
 while len(path) < 6:
     steps = [(action, target) for (source, action, target) in graph.counts if source == path[-1]]
     action, target = next(step for step in steps if step[1] not in path[-2:])
     actions.append(action)
     path.append(target)
-shown = [patterns[known[aspect]] for aspect in path]
+shown = [known[aspect] for aspect in path]
+
+# %%
 seen = list(shown)
-seen[2] = next(p for p in patterns if p not in [patterns[k] for k in known] and not set(p) & set(shown[2]))
+seen[2] = next(p for p in patterns if p not in known and not set(p) & set(shown[2]))
 seen[3] = (shown[3][0], None)
 for time, (true, look) in enumerate(zip(shown, seen, strict=True)):
     print(
@@ -63,9 +64,9 @@ for time, (true, look) in enumerate(zip(shown, seen, strict=True)):
     )
 
 # %%
-inference = begin_trial("gtsam", memory, parameters)
+inference = atg.begin_trial("gtsam", memory, parameters)
 for time, look in enumerate(seen):
-    inference.observe(Evidence.of_detection(memory.assumptions.alphabet, look))
+    inference.observe(atg.Evidence.of_detection(memory.assumptions.alphabet, look))
     if time < len(actions):
         inference.act(actions[time])
 belief = inference.identity()
@@ -120,13 +121,22 @@ assert (best.hypothesis, [patterns[names[state]] for state in best.states]) == (
 
 # %% [markdown]
 # Samples come from the same posterior. Of 1,000 draws (seed 0), the shares of the most frequent stories are near their
-# probabilities.
+# probabilities; lines are 95 % Wilson intervals.
 
 # %%
-drawn = sample_explanations(chain, 1000, np.random.default_rng(0))
-for explanation in best_explanations(chain, 3):
-    same = sum((each.hypothesis, each.states) == (explanation.hypothesis, explanation.states) for each in drawn)
-    print(f"drawn {same / 1000:.3f}, probability {explanation.probability:.4f}")
+drawn = [(each.hypothesis, each.states) for each in sample_explanations(chain, 1000, np.random.default_rng(0))]
+with plot_style():
+    figure = figure_class()(figsize=(6.0, 2.4), layout="constrained")
+    axes = figure.subplots()
+    for place, explanation in enumerate(best_explanations(chain, 4)):
+        count = drawn.count((explanation.hypothesis, explanation.states))
+        low, high = wilson_interval(count, len(drawn))
+        axes.bar(place, explanation.probability, color=PALETTE[0], alpha=0.4, width=0.6)
+        axes.plot([place, place], [low, high], color=PALETTE[1], linewidth=2)
+        axes.plot(place, count / len(drawn), "o", color=PALETTE[1])
+    axes.set(xticks=range(4), xlabel="explanation, the most probable first", ylabel="probability")
+    axes.set(yscale="log", ylim=(1e-4, 2), title="Probability (bar) and share of samples (dot)")
+figure
 
 # %% [markdown]
 # ## Filtered and smoothed
@@ -138,14 +148,15 @@ for explanation in best_explanations(chain, 3):
 # %%
 def true_pattern_probabilities(looks):
     """p(true pattern at each look | object 0, the first ``looks`` looks)."""
-    part = begin_trial("bayes-filter", memory, parameters)
+    part = atg.begin_trial("bayes-filter", memory, parameters)
     for time in range(looks):
-        part.observe(Evidence.of_detection(memory.assumptions.alphabet, seen[time]))
+        part.observe(atg.Evidence.of_detection(memory.assumptions.alphabet, seen[time]))
         if time < looks - 1:
             part.act(actions[time])
     return [row[patterns.index(true)] for row, true in zip(pattern_marginals(part, 0), shown, strict=False)]
 
 
+# %%
 filtered = [true_pattern_probabilities(time + 1)[time] for time in range(6)]
 smoothed = true_pattern_probabilities(6)
 with plot_style():
@@ -164,7 +175,7 @@ figure
 # edges. Learning from smoothed patterns takes what is at least 95 % probable given everything.
 
 # %%
-raw = [Evidence.of_detection(memory.assumptions.alphabet, look).pattern for look in seen]
+raw = [atg.Evidence.of_detection(memory.assumptions.alphabet, look).pattern for look in seen]
 for time, pair in enumerate(zip(raw, smoothed_patterns(inference, 0), strict=True)):
     one, other = (None if pattern is None else patterns[pattern] for pattern in pair)
     print(f"look {time}: raw {one}, smoothed {other}")

@@ -22,46 +22,49 @@
 # about cubes.
 
 # %%
-import json
-from pathlib import Path
-
 import numpy as np
 
-from atg_fg import TestPlan, arcube_assumptions, preset, run_test
+import atg_fg as atg
+from atg_fg.core.statistics import wilson_interval
 from atg_fg.display.completed_picture import draw_completed_atg
 from atg_fg.display.figures import GREY, PALETTE, figure_class, plot_style
 from atg_fg.display.structure_picture import draw_structure
-from atg_fg.display.structure_words import action_text, register_names
-from atg_fg.display.success_plots import plot_ablation
 from atg_fg.experiments.exploration import learned_memory
-from atg_fg.learning.completion import completed_atg, statuses
-from atg_fg.policies import RandomPolicy
-from atg_fg.worlds.arcube import make_arcubes
+from atg_fg.learning.completion import completed_atg
+from atg_fg.storage.packaged import packaged_result
 
-assumptions = arcube_assumptions()
-cubes = make_arcubes(8, seed=0)
+assumptions = atg.arcube_assumptions()
+cubes = atg.make_arcubes(8, seed=0)
 
 # %% [markdown]
 # ## The structure emerges
 #
-# A memory learns trial by trial, each with another cube and 10 random actions. After every trial: the best structure's
+# A memory learns trial by trial, each with another cube and 10 random actions. After some of them: the best structure's
 # registers and poses, and how many nats it explains the trials better than plain ATGs do, its prior included.
 
 # %%
+gains = {}
 for n_trials in (1, 2, 3, 5, 8):
-    memory = learned_memory(
-        assumptions, cubes[:n_trials], RandomPolicy(), 10, np.random.default_rng(0), parameters=preset("learned")
-    )
+    policy, rng = atg.make_policy("random"), np.random.default_rng(0)
+    memory = learned_memory(assumptions, cubes[:n_trials], policy, 10, rng, parameters=atg.preset("learned"))
     found = memory.learner.candidates
-    best = f"{found[0].n_registers} registers, {len(found[0].poses().registers)} poses" if found else "none"
-    print(f"{n_trials} trials: {best}; gain {max(memory.learner.gain, 0.0):.1f} nats")
+    best = f"{found[0].n_registers} registers, {len(found[0].poses().registers)} poses" if found else "no structure"
+    gains[n_trials] = max(memory.learner.gain, 0.0), best
 
 # %%
-structure = memory.learner.candidates[0]
-names = register_names(structure, assumptions.alphabet.slots)
-for action, sources in zip(assumptions.actions, structure.sources, strict=True):
-    print(f"{action}: {action_text(sources, names)}")
-draw_structure(structure, assumptions)
+with plot_style():
+    figure = figure_class()(figsize=(6.0, 2.8), layout="constrained")
+    axes = figure.subplots()
+    axes.plot(list(gains), [gain for gain, _ in gains.values()], "o-", color=PALETTE[0])
+    for best, (n_trials, gain) in {best: (n, gain) for n, (gain, best) in reversed(gains.items())}.items():
+        axes.annotate(best, (n_trials, gain), (0, 7), textcoords="offset points", ha="right", fontsize=8, color=GREY)
+    axes.set(xlabel="trials", ylabel="nats better than plain ATGs", xlim=(-0.6, 8.4))
+    axes.margins(y=0.2)
+    axes.set_title("The structure emerges (one memory, seed 0)")
+figure
+
+# %%
+draw_structure(memory.learner.candidates[0], assumptions)
 
 # %% [markdown]
 # Six registers, two of them in view, and 24 poses: the rotations of a cube, found from what was seen in a few trials.
@@ -72,9 +75,7 @@ draw_structure(structure, assumptions)
 # and where actions never tried lead.
 
 # %%
-completed = completed_atg(memory, memory.names[0])
-print({status: count for status, count in statuses(completed).items() if count})
-draw_completed_atg(completed, assumptions)
+draw_completed_atg(completed_atg(memory, memory.names[0]), assumptions)
 
 # %% [markdown]
 # ## What it is worth
@@ -83,15 +84,8 @@ draw_completed_atg(completed, assumptions)
 # policy, 95 % Wilson intervals. The curves are read from what `make results-structure` has left.
 
 # %%
-cells = json.loads(Path("../results/ablation.json").read_text())["cells"]
-plot_ablation(cells)
-
-# %%
-for noise in dict.fromkeys(cell["noise"] for cell in cells):
-    for variant in ("paper", "default", "learned"):
-        row = {c["actions"]: c for c in cells if (c["variant"], c["noise"], c["world"]) == (variant, noise, "ideal")}
-        shares = (f"{n}: {100 * cell['success']:5.1f}" for n, cell in row.items() if n in (4, 6, 10, 20))
-        print(f"{noise:>20} {variant:>8}  " + "  ".join(shares))
+cells = packaged_result("ablation")["cells"]
+atg.plot_ablation(cells)
 
 # %% [markdown]
 # ## Is the belief right?
@@ -104,42 +98,49 @@ for noise in dict.fromkeys(cell["noise"] for cell in cells):
 # %%
 def novelty(name, engine):
     """The posterior of unseen at the end of each trial, and whether the object was new."""
-    posterior, new = [], []
+    told = []
     for seed in (0, 1):
         met = set()
 
         def keep(_, record, met=met):
             number = record.steps[0].truth["object"]
-            posterior.append(record.belief.unseen)
-            new.append(number not in met)
+            told.append((record.belief.unseen, number not in met))
             met.add(number)
 
-        run_test(TestPlan(engine=engine, parameters=preset(name), n_actions=6), seed, on_trial=keep)
-    return np.array(posterior), np.array(new)
+        plan = atg.TestPlan(engine=engine, parameters=atg.preset(name), n_actions=6)
+        atg.run_test(plan, seed, on_trial=keep)
+    return np.array(told).T
 
 
-models = {"paper": "bayes-filter", "default": "bayes-filter", "learned": "learned-structure"}
-novelties = {name: novelty(name, engine) for name, engine in models.items()}
+engines = {"paper": "bayes-filter", "default": "bayes-filter", "learned": "learned-structure"}
+novelties = {name: novelty(name, engine) for name, engine in engines.items()}
+
+# %%
 for name, (posterior, new) in novelties.items():
     surprise = -np.log(np.clip(np.where(new, posterior, 1 - posterior), 1e-12, None)).mean()
     print(f"{name:>8}: Brier score {np.mean((posterior - new) ** 2):.3f}, mean surprise {surprise:.2f} nats")
 
+
 # %%
+def in_bins(posterior, new, edges=(0.0, 0.01, 0.2, 0.5, 0.8, 0.99, 1.0)):
+    """The mean posterior, the share that was new with its 95 % interval, and the number of trials, in each bin."""
+    bins = np.clip(np.digitize(posterior, edges) - 1, 0, len(edges) - 2)
+    for number in np.unique(bins):
+        held = new[bins == number]
+        yield posterior[bins == number].mean(), held.mean(), wilson_interval(int(held.sum()), len(held)), len(held)
+
+
 with plot_style():
-    figure = figure_class()(figsize=(5.2, 3.6), layout="constrained")
-    axes = figure.subplots()
-    axes.plot([0, 1], [0, 1], color=GREY, linewidth=1, linestyle="--")
-    edges = np.array([0.0, 0.01, 0.2, 0.5, 0.8, 0.99, 1.0])
-    for rank, (name, (posterior, new)) in enumerate(novelties.items()):
-        bins = np.clip(np.digitize(posterior, edges) - 1, 0, len(edges) - 2)
-        held = [number for number in range(len(edges) - 1) if (bins == number).any()]
-        told, true = zip(*[(posterior[bins == b].mean(), new[bins == b].mean()) for b in held], strict=True)
-        sizes = [20 + 2 * (bins == b).sum() for b in held]
-        axes.scatter(told, true, s=sizes, color=PALETTE[rank], label=name, alpha=0.8)
-    axes.set(xlabel="posterior of unseen", ylabel="share that was new", title="Novelty, told and true")
-    axes.legend(markerscale=0.5)
+    figure = figure_class()(figsize=(7.4, 3.0), layout="constrained")
+    for axes, color, (name, each) in zip(figure.subplots(1, 3, sharey=True), PALETTE, novelties.items(), strict=False):
+        axes.plot([0, 1], [0, 1], color=GREY, linewidth=1, linestyle="--")
+        for told, true, interval, n_trials in in_bins(*each):
+            axes.plot([told, told], interval, color=color, linewidth=1.5, alpha=0.6)
+            axes.scatter(told, true, s=12 + n_trials, color=color)
+        axes.set(title=name, xlabel="posterior of unseen", xlim=(-0.06, 1.06))
+    figure.axes[0].set_ylabel("share that was new")
 figure
 
 # %% [markdown]
-# The area of a dot grows with its trials. *Surprise* is what the truth cost each model on the mean: one that is sure
-# and wrong pays most.
+# Bars are 95 % Wilson intervals; the area of a dot grows with its trials. *Surprise* is what the truth cost each model
+# on the mean: one that is sure and wrong pays most.

@@ -25,24 +25,15 @@
 
 # %%
 import numpy as np
-from matplotlib.figure import Figure
 
-from atg_fg.core.assumptions import arcube_assumptions
-from atg_fg.core.memory import RobotMemory
-from atg_fg.core.patterns import MISSING
+import atg_fg as atg
 from atg_fg.core.statistics import wilson_interval
 from atg_fg.display.figures import GREY, INK, PALETTE, figure_class, plot_style
-from atg_fg.display.trial_plots import plot_belief
-from atg_fg.engines import begin_trial
-from atg_fg.experiments.trial import run_trial
-from atg_fg.policies import make_policy
-from atg_fg.storage.presets import preset
-from atg_fg.worlds.arcube import ACTION_SOURCES, N_TAGS, make_arcubes
-from atg_fg.worlds.registry import make_world
 
-cubes = make_arcubes(4, seed=0)
-world = make_world("robonaut", cubes=cubes, condition="nominal", render_mode="rgb_array")
+cubes = atg.make_arcubes(4, seed=0)
+world = atg.make_world("robonaut", cubes=cubes, condition="nominal", render_mode="rgb_array")
 
+# %%
 # After the world, which imports the simulator without its banner.
 from sim.bodies.robot import HOME_POSTURE
 from sim.manipulation.waypoints import GRIP_FORCE
@@ -53,6 +44,7 @@ from sim.vision.tag_detection import draw_detections
 from sim.worlds.domain_randomization import condition_named
 from sim.worlds.film import observed
 
+assumptions = atg.arcube_assumptions()
 robot = world.unwrapped
 
 # %% [markdown]
@@ -67,7 +59,7 @@ robot = world.unwrapped
 
 
 # %%
-def gallery(pictures: dict[str, np.ndarray], columns: int, size: tuple[float, float]) -> Figure:
+def gallery(pictures: dict[str, np.ndarray], columns: int, size: tuple[float, float]):
     """Return a figure of pictures with titles."""
     with plot_style():
         figure = figure_class()(figsize=size, layout="constrained")
@@ -113,8 +105,9 @@ def at_half_turn() -> None:
             pictures["turn, half-way"] = observed(robot.scene, observer)
 
 
+# %%
 robot.manipulator.on_phase, robot.scene.on_step = at_end_of_phase, at_half_turn
-_, _, _, _, outcome = world.step(np.int64(list(ACTION_SOURCES).index("flip")))
+_, _, _, _, outcome = world.step(np.int64(assumptions.action_index("flip")))
 gallery(pictures, columns=4, size=(10, 5.3))
 
 # %%
@@ -139,6 +132,8 @@ JOINTS = "shoulder roll", "shoulder pitch", "upper-arm roll", "elbow", "forearm 
 exertion, body = robot.controller.exertion, robot.scene.robot
 gravity = np.abs(body.gravity_torques(HOME_POSTURE)) / body.effort
 rows = np.arange(len(JOINTS))
+
+# %%
 with plot_style():
     figure = figure_class()(figsize=(8.4, 3.6), layout="constrained")
     panels = figure.subplots(1, 2, sharey=True)
@@ -173,7 +168,7 @@ print(f"steps in which a torque was cut: {exertion.saturated_steps} of {exertion
 # anew for each trial. The front of the same cube, as the robot sees it under both:
 
 # %%
-worn_world = make_world("robonaut", cubes=cubes, condition="worn")
+worn_world = atg.make_world("robonaut", cubes=cubes, condition="worn")
 worn_world.reset(seed=0, options={"object": 0, "orientation": 0})
 world.reset(seed=0, options={"object": 0, "orientation": 0})
 frames = {}
@@ -194,11 +189,13 @@ gallery(frames, columns=2, size=(6.4, 1.75))
 # %%
 runs = run_actions("worn", 14, seed=0, jobs=1)
 looks = [look for run in runs for look in run.looks]
-confusion = np.zeros((N_TAGS, N_TAGS + 1), dtype=int)
+n_tags = assumptions.alphabet.n_symbols
+confusion = np.zeros((n_tags, n_tags + 1), dtype=int)
 for look in looks:
     for shown, detected in zip(look.shown, look.detected, strict=True):
-        confusion[shown, N_TAGS if detected == MISSING else detected] += 1
+        confusion[shown, detected] += 1  # a slot in which nothing was detected is -1: the last column
 
+# %%
 with plot_style():
     figure = figure_class()(figsize=(5.7, 4.7), layout="constrained")
     axes = figure.subplots()
@@ -207,9 +204,9 @@ with plot_style():
         count = confusion[shown, detected]
         color = "white" if count > confusion.max() / 2 else INK
         axes.text(detected, shown, count, ha="center", va="center", color=color)
-    axes.axvline(N_TAGS - 0.5, color=GREY, linewidth=1)
-    axes.set_xticks(range(N_TAGS + 1), [*map(str, range(N_TAGS)), "\nmissing"])
-    axes.set_yticks(range(N_TAGS))
+    axes.axvline(n_tags - 0.5, color=GREY, linewidth=1)
+    axes.set_xticks(range(n_tags + 1), [*map(str, range(n_tags)), "\nmissing"])
+    axes.set_yticks(range(n_tags))
     axes.set(xlabel="detected", ylabel="shown", title=f"Symbols in the slots of {len(looks)} looks, worn")
     axes.grid(visible=False)
     figure.colorbar(image, ax=axes, label="slots", shrink=0.8)
@@ -344,13 +341,12 @@ figure
 # First a small memory: each of 4 cubes is turned over by 12 random actions in the ideal world, and is known to be new.
 
 # %%
-assumptions = arcube_assumptions()
-memory = RobotMemory(assumptions)
-ideal = make_world("ideal", cubes=cubes)
+memory = atg.RobotMemory(assumptions)
+ideal = atg.make_world("ideal", cubes=cubes)
 rng = np.random.default_rng(0)
 for cube in range(len(cubes)):
-    inference = begin_trial("bayes-filter", memory, preset("default"))
-    learned = run_trial(ideal, inference, make_policy("random"), 12, rng, reset_options={"object": cube})
+    inference = atg.begin_trial("bayes-filter", memory, atg.preset("default"))
+    learned = atg.run_trial(ideal, inference, atg.make_policy("random"), 12, rng, reset_options={"object": cube})
     memory.learn(learned.patterns, learned.actions, matched=None)
 list(memory)
 
@@ -361,9 +357,9 @@ list(memory)
 
 # %%
 PRESENTED = 2
-inference = begin_trial("gtsam", memory, parameters)
+inference = atg.begin_trial("gtsam", memory, parameters)
 rng = np.random.default_rng(0)
-record = run_trial(world, inference, make_policy("entropy"), 4, rng, reset_options={"object": PRESENTED})
+record = atg.run_trial(world, inference, atg.make_policy("entropy"), 4, rng, reset_options={"object": PRESENTED})
 world.close()
 for number, step in enumerate(record.steps):
     look = "right" if step.detection == step.truth["pattern"] else f"wrong, shown was {step.truth['pattern']}"
@@ -373,7 +369,7 @@ for number, step in enumerate(record.steps):
         print(f"  then {assumptions.actions[step.action]}, {action}")
 
 # %%
-plot_belief([step.belief for step in record.steps], record.names)
+atg.plot_belief([step.belief for step in record.steps], record.names)
 
 # %%
 truth = memory.names[PRESENTED]

@@ -25,29 +25,19 @@ from dataclasses import replace
 
 import numpy as np
 
-from atg_fg import begin_trial, preset
-from atg_fg.core.aspect_graph import AspectTransitionGraph
-from atg_fg.core.assumptions import arcube_assumptions
-from atg_fg.core.goals import Goal
-from atg_fg.core.patterns import Evidence
-from atg_fg.display.atg_picture import draw_atg
+import atg_fg as atg
 from atg_fg.display.figures import PALETTE, figure_class, plot_style
 from atg_fg.experiments.exploration import learned_memory
 from atg_fg.experiments.goal_scores import summarise
 from atg_fg.experiments.goals import COMPLETE, GoalPlan, run_many
-from atg_fg.experiments.trial import run_trial
 from atg_fg.inference.all_different import different_identities
-from atg_fg.inference.joint_factor_graph import JointRecognitionGraph
 from atg_fg.inference.known_transitions import transitions_of_graph
-from atg_fg.policies import ExplorationPolicy, GoalPolicy
 from atg_fg.policies.shortest_paths import nearest_aspect, reachable_aspects, shortest_path
-from atg_fg.worlds.arcube import make_arcubes, shown_pattern
-from atg_fg.worlds.arcube_world import ARcubeWorld
 
-assumptions = arcube_assumptions()
+assumptions = atg.arcube_assumptions()
 alphabet = assumptions.alphabet
-cubes = make_arcubes(20, seed=0)
-memory = learned_memory(assumptions, cubes, ExplorationPolicy(), 20, np.random.default_rng(0))
+cubes = atg.make_arcubes(20, seed=0)
+memory = learned_memory(assumptions, cubes, atg.make_policy("explore"), 20, np.random.default_rng(0))
 graph = memory["object-000"]
 graph
 
@@ -68,27 +58,27 @@ source = int(np.argmax(reach))
 lengths = {
     target: len(path.actions)
     for target in range(graph.n_known)
-    if (path := shortest_path(paths, source, Goal(alphabet, graph.aspects[target]))) is not None
+    if (path := shortest_path(paths, source, atg.Goal(alphabet, graph.aspects[target]))) is not None
 }
-goal = Goal(alphabet, graph.aspects[max(lengths, key=lengths.get)])
+goal = atg.Goal(alphabet, graph.aspects[max(lengths, key=lengths.get)])
 way = shortest_path(paths, source, goal)
 print(f"from {graph.aspects[source]} to {goal}: {[assumptions.actions[action] for action in way.actions]}")
 
 # %%
 steps = list(zip(way.aspects, way.actions, way.aspects[1:], strict=False))
-draw_atg(graph, highlight=source, path=steps)
+atg.plot_atg(graph, highlight=source, path=steps)
 
 # %% [markdown]
 # A part of a pattern is easier to reach, and a symbol that the cube does not have cannot be reached at all. Then the
 # nearest aspect is the one with most of what was wanted.
 
 # %%
-on_top = Goal.of_slots(alphabet, {"top": goal.symbols[1]})
+on_top = atg.Goal.of_slots(alphabet, {"top": goal.symbols[1]})
 part = shortest_path(paths, source, on_top)
 print(f"{on_top}: {len(part.actions)} actions; the whole of {goal}: {len(way.actions)}")
 
 absent = next(tag for tag in range(12) if tag not in cubes[0])
-impossible = Goal(alphabet, (absent, goal.symbols[1]))
+impossible = atg.Goal(alphabet, (absent, goal.symbols[1]))
 nearest = graph.aspects[nearest_aspect(paths, source, impossible).aspects[-1]]
 print(f"{impossible}: {shortest_path(paths, source, impossible)}; nearest {nearest}")
 
@@ -99,15 +89,15 @@ print(f"{impossible}: {shortest_path(paths, source, impossible)}; nearest {neare
 # reliable way wins over a short one. In this little ATG a flip leads to the goal one time in four; two turns always do.
 
 # %%
-risky = AspectTransitionGraph("risky", assumptions)
+risky = atg.AspectTransitionGraph("risky", assumptions)
 for pattern in [(0, 1), (2, 1), (3, 1)]:
     risky.add_aspect(pattern)
 flip, left, right = range(3)
 for here, action, there, count in [(0, flip, 2, 1), (0, flip, 0, 3), (0, left, 1, 4), (1, left, 2, 4)]:
     risky.add_transition(here, action, there, count)
-sure_way = shortest_path(transitions_of_graph(risky), 0, Goal(alphabet, (3, 1)))
+sure_way = shortest_path(transitions_of_graph(risky), 0, atg.Goal(alphabet, (3, 1)))
 print([assumptions.actions[action] for action in sure_way.actions], f"cost {sure_way.cost}")
-draw_atg(risky, highlight=0, path=[(0, left, 1), (1, left, 2)])
+atg.plot_atg(risky, highlight=0, path=[(0, left, 1), (1, left, 2)])
 
 # %% [markdown]
 # ## Acting on a belief
@@ -120,12 +110,13 @@ draw_atg(risky, highlight=0, path=[(0, left, 1), (1, left, 2)])
 # %%
 def served(policy, cube, seed, **noise):
     """A trial with one cube of a noisy or ideal world."""
-    inference = begin_trial("gtsam", memory, preset("default"))
+    inference = atg.begin_trial("gtsam", memory, atg.preset("default"))
     rng = np.random.default_rng(seed)
-    return run_trial(ARcubeWorld(cubes, **noise), inference, policy, 40, rng, reset_options={"object": cube})
+    world = atg.make_world("ideal", cubes=cubes, **noise)
+    return atg.run_trial(world, inference, policy, 40, rng, reset_options={"object": cube})
 
 
-record = served(GoalPolicy(goal), cube=0, seed=1)
+record = served(atg.GoalPolicy(goal), cube=0, seed=1)
 for number, step in enumerate(record.steps):
     action = "" if step.action is None else assumptions.actions[step.action]
     entropy = step.belief.entropy_of_verdict
@@ -138,11 +129,10 @@ for number, step in enumerate(record.steps):
 # them, and a factor that says that no two are the same object.
 
 # %%
-looks = [shown_pattern(cubes[number], 0) for number in (0, 1)]
-trials = [begin_trial("gtsam", memory, preset("default")) for _ in looks]
-for trial, look in zip(trials, looks, strict=True):
-    trial.observe(Evidence.of_detection(alphabet, look))
-joint = JointRecognitionGraph([trial.chain() for trial in trials], memory.n_unseen)
+trials = [atg.begin_trial("gtsam", memory, atg.preset("default")) for _ in range(2)]
+for trial, name in zip(trials, ("object-000", "object-001"), strict=True):
+    trial.observe(atg.Evidence.of_detection(alphabet, memory[name].aspects[0]))
+joint = atg.JointRecognitionGraph([trial.chain() for trial in trials], memory.n_unseen)
 joint
 
 # %% [markdown]
@@ -151,19 +141,30 @@ joint
 # posteriors come without a factor over all identities, by a recursion over sets of cubes that also works with many.
 
 # %%
-sure, glance = (begin_trial("gtsam", memory, preset("default")) for _ in range(2))
+sure, glance = (atg.begin_trial("gtsam", memory, atg.preset("default")) for _ in range(2))
 for time, aspect in enumerate(way.aspects):
-    sure.observe(Evidence.of_detection(alphabet, graph.aspects[aspect]))
+    sure.observe(atg.Evidence.of_detection(alphabet, graph.aspects[aspect]))
     if time < len(way.actions):
         sure.act(way.actions[time])
-glance.observe(Evidence.of_detection(alphabet, (graph.aspects[source][0], None)))
+glance.observe(atg.Evidence.of_detection(alphabet, (graph.aspects[source][0], None)))
 alone = [sure.identity(), glance.identity()]
 together = different_identities(alone)
-from_graph = JointRecognitionGraph([sure.chain(), glance.chain()], memory.n_unseen).identities()
-for name, beliefs in (("alone", alone), ("different", together), ("one graph", from_graph)):
-    first, second = (belief.objects[0] for belief in beliefs)
-    print(f"{name:>10}: p(O1 = object-000) = {first:.4f}, p(O2 = object-000) = {second:.4f}")
+from_graph = atg.JointRecognitionGraph([sure.chain(), glance.chain()], memory.n_unseen).identities()
 assert max(abs(a.probabilities - b.probabilities).max() for a, b in zip(together, from_graph, strict=True)) < 1e-12
+
+# %%
+with plot_style():
+    figure = figure_class()(figsize=(6.4, 2.0), layout="constrained")
+    axes = figure.subplots()
+    for place, beliefs in enumerate((alone, together)):
+        for number, belief in enumerate(beliefs):
+            axes.barh(place + 0.36 * number - 0.18, belief.objects[0], 0.34, color=PALETTE[number])
+            axes.text(belief.objects[0] + 0.01, place + 0.36 * number - 0.18, f"{belief.objects[0]:.3f}", va="center")
+    axes.set(yticks=range(2), yticklabels=["each alone", "two different ones"], xlim=(0, 1.12))
+    axes.set(xlabel="p(it is object-000): the turned cube (blue), the glanced at one (orange)")
+    axes.set_title("What is known of one cube rules it out for the other")
+    axes.invert_yaxis()
+figure
 
 # %% [markdown]
 # ## The experiment
@@ -173,7 +174,7 @@ assert max(abs(a.probabilities - b.probabilities).max() for a, b in zip(together
 # reached, and the others are declared out of reach.
 
 # %%
-base = GoalPlan(engine="bayes-filter", parameters=preset("default"))
+base = GoalPlan(engine="bayes-filter", parameters=atg.preset("default"))
 plans = {
     "complete memory": replace(base, learning_actions=COMPLETE),
     "20 actions, declare": base,

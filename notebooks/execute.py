@@ -1,5 +1,9 @@
-"""Execute the notebooks of this folder in place, with the sources of their paired scripts: ``make notebooks``."""
+"""Execute the notebooks of this folder in place, with the sources of their paired scripts: ``make notebooks``.
 
+``python notebooks/execute.py 03 06`` executes those two alone.
+"""
+
+import sys
 from pathlib import Path
 
 import jupytext
@@ -18,9 +22,11 @@ def executed(path: Path) -> nbformat.NotebookNode:
     return notebook
 
 
-def main() -> None:
+def main(numbers: list[str]) -> None:
     """Take the sources from the scripts, execute, and write the notebooks with their outputs."""
     for script in sorted(FOLDER.glob("[0-9]*.py")):
+        if numbers and script.name[:2] not in numbers:
+            continue
         path = script.with_suffix(".ipynb")
         source = jupytext.read(script)
         for number, cell in enumerate(source.cells):
@@ -31,4 +37,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    main(sys.argv[1:])

@@ -48,3 +48,10 @@ def test_outputs_are_kept_and_none_is_an_error(path):
     assert any("image/png" in output.get("data", {}) for output in outputs)
     assert {output.output_type for output in outputs} <= {"stream", "execute_result", "display_data"}
     assert not any(output.get("name") == "stderr" for output in outputs)
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+def test_cells_are_short_and_need_no_file_of_a_checkout(path):
+    sources_of_code = [cell.source for cell in nbformat.read(path, as_version=4).cells if cell.cell_type == "code"]
+    assert max(len(source.splitlines()) for source in sources_of_code) < 20
+    assert not any("../" in source for source in sources_of_code)

@@ -22,9 +22,9 @@ from atg_fg.storage.database.connection import is_database
 from atg_fg.storage.database.memory_reading import database_holds_memory
 from atg_fg.storage.database.repairing import repair_database
 from atg_fg.storage.database.trial_log import read_stored_experiments, read_stored_trials
-from atg_fg.storage.example import example_memory
 from atg_fg.storage.memory_files import load_memory
 from atg_fg.storage.memory_json import MEMORY_FORMAT, memory_from_document, memory_from_json
+from atg_fg.storage.packaged import example_memory
 
 app = typer.Typer(
     help="Look at a saved robot memory, check it, export and merge its graphs. Example: atg-fg memory show memory.json",

@@ -170,4 +170,4 @@ def _draw_symbol(
     else:
         middle = corner + (right + up) / 2
         text = "?" if symbol is None else str(symbol)
-        axes.annotate(text, tuple(middle), ha="center", va="center", fontsize=11, color=look.ink, zorder=5)
+        axes.annotate(text, tuple(middle), ha="center", va="center", fontsize=13, color=look.ink, zorder=5)

@@ -25,15 +25,20 @@ _DASHED: Final = (0, (4, 2))
 
 _LOOKS: Final = {
     OBSERVED: Look(),
-    PREDICTED: Look(ink="#8a8a8a", linestyle="dashed", strength=0.45, side="#f0f0f0"),
-    UNKNOWN: Look(ink="#b0b0b0", linestyle="dotted", strength=0.45, side="#f7f7f7"),
+    PREDICTED: Look(ink="#4a4a4a", linestyle="dashed", strength=0.6, side="#f0f0f0"),
+    UNKNOWN: Look(ink="#9a9a9a", linestyle="dotted", strength=0.45, side="#f7f7f7"),
 }
 
 
-_OBSERVED_ARROW: Final = {"linewidth": 2.0}
+_OBSERVED_ARROW: Final = {"linewidth": 2.6}
 
 
 _PREDICTED_ARROW: Final = {"linewidth": 1.0, "alpha": 0.5, "linestyle": _DASHED}
+
+
+#: Predicted arrows that cross the picture are paler, so that what was observed stands out.
+_LONG: Final = 3.0
+_PREDICTED_LONG_ARROW: Final = {**_PREDICTED_ARROW, "linewidth": 0.8, "alpha": 0.28}
 
 
 #: Inches above the picture for title and legend.
@@ -67,8 +72,9 @@ def draw_completed_atg(
         axes = figure.add_axes((0, 0, 1, height / (height + _HEAD)))
         axes.axis("off")
         _draw_edges(axes, graph, assumptions, places)
+        usual = _usual_probability(graph)
         for node, data in graph.nodes(data=True):
-            _draw_node(axes, data, places[node], assumptions.alphabet.slots, symbol_images or {})
+            _draw_node(axes, data, places[node], assumptions.alphabet.slots, symbol_images or {}, usual)
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
         _draw_head(figure, graph, assumptions)
     return figure
@@ -80,7 +86,9 @@ def _draw_edges(axes: Axes, graph: CompletedGraph, assumptions: Assumptions, pla
         number = between[source, target]
         between[source, target] += 1
         color = action_color(assumptions.actions.index(data["action"]))
-        style: dict[str, Any] = {**(_OBSERVED_ARROW if data["observed"] else _PREDICTED_ARROW), "color": color}
+        is_long = bool(np.linalg.norm(places[target] - places[source]) > _LONG)
+        predicted = _PREDICTED_LONG_ARROW if is_long else _PREDICTED_ARROW
+        style: dict[str, Any] = {**(_OBSERVED_ARROW if data["observed"] else predicted), "color": color}
         if source == target:
             _draw_loop(axes, places[source], number, style)
         else:
@@ -103,12 +111,23 @@ def _draw_loop(axes: Axes, place: FloatArray, number: int, style: dict[str, Any]
     )  # fmt: skip
 
 
-def _draw_node(axes: Axes, data: dict[str, Any], place: FloatArray, slots: tuple[str, ...], images: Images) -> None:
+def _usual_probability(graph: CompletedGraph) -> str | None:
+    """Return the probability that most predicted aspects have, which is said once, in the legend."""
+    texts = Counter(
+        probability_text(data["probability"]) for _, data in graph.nodes(data=True) if data["status"] == PREDICTED
+    )
+    return texts.most_common(1)[0][0] if texts else None
+
+
+def _draw_node(
+    axes: Axes, data: dict[str, Any], place: FloatArray, slots: tuple[str, ...], images: Images, usual: str | None
+) -> None:
     status = data["status"]
     draw_aspect(axes, slots, data["symbols"], place, images, _LOOKS[status])
-    if status == PREDICTED:
+    probability = probability_text(data["probability"])
+    if status == PREDICTED and probability != usual:
         axes.annotate(
-            f"p {probability_text(data['probability'])}", (place[0] - 0.16, place[1] - 0.7), ha="center", va="center",
+            f"p {probability}", (place[0] - 0.16, place[1] - 0.7), ha="center", va="center",
             fontsize=6.5, color=GREY, zorder=6,
             bbox={"boxstyle": "round,pad=0.08", "facecolor": "white", "edgecolor": "none", "alpha": 0.85},
         )  # fmt: skip
@@ -136,9 +155,12 @@ def _draw_head(figure: Figure, graph: CompletedGraph, assumptions: Assumptions) 
     ]
     handles.append(Line2D([], [], color=INK, linewidth=2.0, label="observed"))
     certainties = [data["probability"] for _, _, data in graph.edges(data=True) if not data["observed"]]
+    usual = _usual_probability(graph)
     if numbers[PREDICTED] or numbers[UNKNOWN] or certainties:
-        told = f" (p {probability_text(min(certainties))})" if certainties else ""
-        handles.append(Line2D([], [], color=GREY, linewidth=1.0, linestyle=_DASHED, label=f"predicted{told}"))
+        told = [f"aspects p {usual}"] if usual else []
+        told += [f"transitions p {probability_text(min(certainties))}"] if certainties else []
+        label = f"predicted ({', '.join(told)})" if told else "predicted"
+        handles.append(Line2D([], [], color=GREY, linewidth=1.0, linestyle=_DASHED, label=label))
     legend = figure.legend(handles=handles, loc="upper center", ncols=len(handles), title=title, fontsize=9)
     legend.get_title().set_fontweight("bold")
     legend.get_title().set_parse_math(False)

@@ -45,10 +45,20 @@ def test_observed_and_predicted_transitions_are_drawn_apart(memory):
     n_observed = len(memory["object-000"].counts)
     assert arrows(figure) == (n_observed, 72 - n_observed)
     texts = [text.get_text() for text in figure.axes[0].texts]
-    n_predicted = sum(status == "predicted" for _, status in graph.nodes(data="status"))
-    assert sum(text.startswith("p ") for text in texts) == n_predicted
     assert ("?" in texts) == any(status == "unknown" for _, status in graph.nodes(data="status"))
     assert drawn(figure) == drawn(draw_completed_atg(graph, ARCUBES))
+
+
+def test_the_probability_of_most_predicted_aspects_is_said_once_and_others_at_theirs(memory):
+    graph = completed_atg(memory, "object-000")
+    predicted = [data for _, data in graph.nodes(data=True) if data["status"] == "predicted"]
+    for data in predicted:
+        data["probability"] = 0.97
+    predicted[0]["probability"] = 0.71
+    figure = draw_completed_atg(graph, ARCUBES)
+    assert [text.get_text() for text in figure.axes[0].texts if text.get_text().startswith("p ")] == ["p 0.71"]
+    (legend,) = figure.legends
+    assert any("aspects p 0.97" in text.get_text() for text in legend.get_texts())
 
 
 def test_no_two_aspects_are_drawn_at_the_same_place(memory):
