@@ -18,6 +18,8 @@ from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import MISSING, FloatArray
 from atg_fg.core.statistics import wilson_interval
 from atg_fg.worlds.arcube import ACTION_SOURCES
+from sim.bodies.prepared_robot import PreparedRobot
+from sim.manipulation.preparation import prepared
 from sim.worlds.domain_randomization import condition_named
 from sim.worlds.robonaut_world import RobonautARcubeWorld
 from sim.worlds.stations_world import RobonautTableWorld
@@ -109,6 +111,7 @@ def run_actions(
     for name, number in (("actions", n_actions), ("jobs", jobs), ("stations", n_stations)):
         if number < 1:
             raise InvalidInputError(f"{name}: {number}; expected a whole number of at least 1")
+    robot = None if urdf is None else prepared(urdf)
     runs: list[Run] = []
     left = n_actions
     spawner = np.random.SeedSequence(seed)
@@ -116,7 +119,7 @@ def run_actions(
         while left > 0:
             lengths = [ACTIONS_A_TRIAL] * (left // ACTIONS_A_TRIAL)
             lengths += [left % ACTIONS_A_TRIAL] if left % ACTIONS_A_TRIAL else []
-            for run in run_all(partial(_run_trial, condition, urdf, n_stations), lengths, spawner.spawn(len(lengths))):
+            for run in run_all(partial(_run_trial, condition, robot, n_stations), lengths, spawner.spawn(len(lengths))):
                 runs.append(run)
                 left -= len(run.actions)
                 if on_trial is not None:
@@ -134,9 +137,11 @@ def _mapping(jobs: int) -> Iterator[Callable[..., Iterator[Run]]]:
         yield pool.map
 
 
-def _run_trial(condition: str, urdf: Path | None, n_stations: int, n_actions: int, seed: np.random.SeedSequence) -> Run:
+def _run_trial(
+    condition: str, robot: PreparedRobot | None, n_stations: int, n_actions: int, seed: np.random.SeedSequence
+) -> Run:
     rng = np.random.default_rng(seed)
-    with closing(_world(condition, urdf, n_stations)) as world:
+    with closing(_world(condition, robot, n_stations)) as world:
         begun = time.perf_counter()
         observation, info = world.reset(seed=int(rng.integers(2**31)))
         run = Run(world.controller.exertion.velocity, world.controller.exertion.effort)
@@ -159,10 +164,10 @@ def _run_trial(condition: str, urdf: Path | None, n_stations: int, n_actions: in
     return run
 
 
-def _world(condition: str, urdf: Path | None, n_stations: int) -> RobonautARcubeWorld:
+def _world(condition: str, robot: PreparedRobot | None, n_stations: int) -> RobonautARcubeWorld:
     if n_stations == 1:
-        return RobonautARcubeWorld(condition=condition, urdf=urdf)
-    return RobonautTableWorld(n_stations=n_stations, condition=condition, urdf=urdf)
+        return RobonautARcubeWorld(condition=condition, urdf=robot)
+    return RobonautTableWorld(n_stations=n_stations, condition=condition, urdf=robot)
 
 
 def summarise(runs: Sequence[Run]) -> dict[str, Any]:

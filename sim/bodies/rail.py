@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Final
 from xml.etree import ElementTree
 
 import numpy as np
 import pybullet
 
-from sim.bodies.urdf_reader import Description
+from sim.bodies.robot_model import BASE
 
 RAIL_SPEED: Final = 0.8  # m/s, the motor's limit
 
@@ -32,40 +31,19 @@ _POSITION_GAIN, _VELOCITY_GAIN = 0.1, 1.0
 _NAME: Final = "atg-fg rail"
 
 
-def on_rail(description: Description, folder: Path, reach: float) -> Path:
-    """Write a copy whose root slides on a rail, ``reach`` (m) to the robot's left and right, and return its path.
-
-    It is written into ``folder``, an absolute path; meshes and textures stay where they are.
-    """
-    robot = ElementTree.parse(description.path).getroot()
-    children = {child.get("link") for child in robot.iterfind("joint/child")}
-    (root,) = {link.get("name", "") for link in robot.iterfind("link")} - children
-    for element in robot.iter():
-        if "filename" in element.attrib:
-            element.set("filename", _found(element.attrib["filename"], description.path))
+def on_rail(urdf: str, reach: float) -> str:
+    """Return a robot's description with its base on a rail, ``reach`` (m) to the robot's left and right."""
+    robot = ElementTree.fromstring(urdf)
     inertial = ElementTree.SubElement(ElementTree.SubElement(robot, "link", name=_NAME), "inertial")
     ElementTree.SubElement(inertial, "mass", value="0")
     ElementTree.SubElement(inertial, "inertia", dict.fromkeys(("ixx", "iyy", "izz", "ixy", "ixz", "iyz"), "0"))
     joint = ElementTree.SubElement(robot, "joint", name=_NAME, type="prismatic")
     ElementTree.SubElement(joint, "parent", link=_NAME)
-    ElementTree.SubElement(joint, "child", link=root)
-    # The rail has the root's frame, in which the robot's left may be anywhere.
-    leftwards = " ".join(f"{value:.17g}" for value in description.base_rotation.T @ [0.0, 1.0, 0.0])
-    ElementTree.SubElement(joint, "axis", xyz=leftwards)
+    ElementTree.SubElement(joint, "child", link=BASE)
+    ElementTree.SubElement(joint, "axis", xyz="0 1 0")
     limits = {"lower": -reach, "upper": reach, "effort": RAIL_FORCE, "velocity": RAIL_SPEED}
     ElementTree.SubElement(joint, "limit", {name: f"{value:g}" for name, value in limits.items()})
-    path = folder / "on_rail.urdf"
-    path.write_bytes(ElementTree.tostring(robot))
-    return path
-
-
-def _found(filename: str, urdf: Path) -> str:
-    """Return the absolute path of a file that a description names, looked for as PyBullet does: ever further up."""
-    relative = filename.removeprefix("package://").removeprefix("model://")
-    for folder in urdf.absolute().parents:
-        if (folder / relative).exists():
-            return str(folder / relative)
-    return filename
+    return ElementTree.tostring(robot, encoding="unicode")
 
 
 class Rail:

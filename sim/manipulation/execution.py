@@ -12,8 +12,7 @@ from atg_fg.core.errors import AtgError
 from atg_fg.core.patterns import FloatArray
 from sim.bodies.cube import CUBE_CENTRE
 from sim.bodies.kinematics import cross
-from sim.bodies.robonaut_joints import PAD_RADIUS
-from sim.bodies.robot import HOME_POSTURE, TUCKED_POSTURE, RobotBody
+from sim.bodies.robot import RobotBody
 from sim.manipulation import waypoints
 from sim.manipulation.impedance_control import TIME_STEP, ArmController, JointTarget
 from sim.manipulation.inverse_kinematics import Solution, solve
@@ -55,6 +54,7 @@ class Manipulator:
         self.controller = controller
         self.robot: RobotBody = controller.robot
         self.kinematics = self.robot.kinematics
+        self.home, self.tucked = self.robot.model.home, self.robot.model.tucked
         self.look = look
         self.on_phase = on_phase
         self.squarings = 0
@@ -112,27 +112,31 @@ class Manipulator:
         """Solve for joint angles, and keep account of how the pads roll over the faces while they hold the cube."""
         if waypoint.name == "approach":
             self._rolled, self._held = np.zeros((2, 3)), None
-        solution = solve(self.kinematics, waypoint.task(self._rolled), start, HOME_POSTURE)
+        solution = self._reached(waypoint, start)
         if not waypoint.grip:
             return solution
         held, rolled = self._held, self._rolled
         for _ in range(_ROLLING_ITERATIONS):
             hands = waypoint.rotation.T @ self.kinematics.hands(solution.angles).rotation
             if held is not None:
-                self._rolled = rolled + _rolling(held, hands)
-                solution = solve(self.kinematics, waypoint.task(self._rolled), solution.angles, HOME_POSTURE)
+                self._rolled = rolled + _rolling(held, hands, self.kinematics.pad_radius)
+                solution = self._reached(waypoint, solution.angles)
         self._held = waypoint.rotation.T @ self.kinematics.hands(solution.angles).rotation
         return solution
 
+    def _reached(self, waypoint: Waypoint, start: FloatArray) -> Solution:
+        task = waypoint.task(self._rolled, self.kinematics.pad_radius)
+        return solve(self.kinematics, task, start, self.home)
+
     def go_home(self) -> None:
         """Take the hands back to the cube's sides, clear of it."""
-        self._take_arms_to(HOME_POSTURE)
+        self._take_arms_to(self.home)
 
     def slide(self, place: float) -> None:
         """Raise the arms, slide to ``place`` (m to the left of the rail's middle), and take the hands home there."""
         if self.robot.rail is None:
             return
-        self._take_arms_to(TUCKED_POSTURE)
+        self._take_arms_to(self.tucked)
         for _ in self.robot.rail.ride(place):
             self.controller.hold(TIME_STEP)
         self.go_home()
@@ -141,9 +145,9 @@ class Manipulator:
         self.controller.run([JointTarget(posture, self.robot.gravity_torques(posture), 0.3, still=0.1)])
 
 
-def _rolling(before: FloatArray, after: FloatArray) -> FloatArray:
+def _rolling(before: FloatArray, after: FloatArray, radius: FloatArray) -> FloatArray:
     """Return how far pads roll over the faces as hands turn in the cube's frame, shapes [2, 3, 3] to [2, 3], m."""
     turn = after @ before.transpose(0, 2, 1)
     # For small turns, the rotation vector is the antisymmetric part.
     vector = np.stack([turn[:, 2, 1] - turn[:, 1, 2], turn[:, 0, 2] - turn[:, 2, 0], turn[:, 1, 0] - turn[:, 0, 1]], 1)
-    return PAD_RADIUS * cross(vector / 2, -INWARD)
+    return radius[:, None] * cross(vector / 2, -INWARD)

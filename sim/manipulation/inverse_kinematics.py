@@ -142,5 +142,5 @@ def _spin(palm: FloatArray, wanted: FloatArray, normal: FloatArray) -> FloatArra
 def _solution(kinematics: ArmKinematics, task: HandTask, angles: FloatArray) -> Solution:
     hands = kinematics.hands(angles)
     lean, _ = _lean(hands.axis, task.normal)
-    spin = np.zeros(2) if task.palm is None else np.abs(_spin(hands.palm, task.palm, task.normal))
+    spin = np.zeros(len(angles)) if task.palm is None else np.abs(_spin(hands.palm, task.palm, task.normal))
     return Solution(angles, np.linalg.norm(task.pad - hands.pad, axis=1), np.maximum(0.0, lean - task.cone), spin)

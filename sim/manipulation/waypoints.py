@@ -13,7 +13,6 @@ import numpy as np
 
 from atg_fg.core.patterns import FloatArray
 from sim.bodies.cube import CUBE_CENTRE, CUBE_SIZE
-from sim.bodies.robonaut_joints import PAD_RADIUS
 from sim.manipulation.inverse_kinematics import HandTask
 from sim.vision.cube_pose import CubePose
 
@@ -38,7 +37,7 @@ _PUT_DOWN: Final = np.array([0.0, 0.0, -0.003])  # a little below the table, so 
 
 
 #: The first half of a yaw ends nearer to the robot, where the second half's hands reach both corners.
-_HALFWAY: Final = np.array([-0.05, 0.0, 0.0])
+HALFWAY: Final = np.array([-0.05, 0.0, 0.0])
 
 
 #: How far a hand leans from the face's normal at most: a yaw takes it to the limits of the wrist.
@@ -69,14 +68,15 @@ class Waypoint:
     grip: float = 0.0
     still: float = 0.0
 
-    def task(self, rolled: FloatArray) -> HandTask:
+    def task(self, rolled: FloatArray, pad_radius: FloatArray) -> HandTask:
         """Return what the hands have to do.
 
         Args:
             rolled: How far the pads have rolled over the faces, in the cube's frame, shape [2, 3], m.
+            pad_radius: Of both pads, shape [2], m.
         """
         normal = INWARD @ self.rotation.T
-        reach = CUBE_SIZE / 2 + PAD_RADIUS + self.clearance
+        reach = (CUBE_SIZE / 2 + self.clearance + pad_radius)[:, None]
         palm = np.tile(self.rotation @ [0.0, 0.0, -1.0], (2, 1)) if self.flips else None
         pad = self.position - reach * normal + rolled @ self.rotation.T
         return HandTask(pad, normal, _FLIP_CONE if self.flips else _YAW_CONE, palm)
@@ -118,7 +118,7 @@ def flip(cube: CubePose) -> Iterator[Waypoint]:
 def turn_to_halfway(cube: CubePose, direction: int) -> Iterator[Waypoint]:
     """Turn the cube by 45° about the vertical, to the left (1: the left face comes to the front) or right (−1)."""
     yield from _grasp(cube.position, cube.yaw, flips=False)
-    yield from _drag(cube.position, cube.yaw, CUBE_CENTRE + _HALFWAY, direction * np.pi / 4)
+    yield from _drag(cube.position, cube.yaw, CUBE_CENTRE + HALFWAY, direction * np.pi / 4)
 
 
 def turn_from_halfway(cube: CubePose, direction: int) -> Iterator[Waypoint]:
@@ -149,7 +149,7 @@ def _grasp(position: FloatArray, yaw: float, *, flips: bool = True) -> Iterator[
     yield Waypoint("approach", position, rotation, _WIDE if flips else _TRANSIT, 0.4, flips)
     yield Waypoint("approach", position, rotation, _NEAR, 0.3, flips)
     # Touch first, then press: a hand pushed before it touches is pushed aside as well.
-    yield Waypoint("grasp", position, rotation, _PRESS, 0.3, flips, still=0.05)
+    yield Waypoint("grasp", position, rotation, _PRESS, 0.5, flips, still=0.05)
     yield Waypoint("grasp", position, rotation, _PRESS, 0.15, flips, GRIP_FORCE, still=0.05)
 
 

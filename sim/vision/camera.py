@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from atg_fg.core.patterns import FloatArray
 
-_NEAR, _FAR = 0.05, 4.0  # m
+_FAR = 4.0  # m
 
 
 @dataclass(frozen=True)
@@ -38,12 +38,14 @@ class Camera:
         target: The point in the middle of the image, m.
         field_of_view: Vertical, degrees.
         image_size: (width, height) in pixels.
+        near: What is nearer is not seen, m: the robot's own head, which the eye is in.
     """
 
     eye: tuple[float, float, float] = (0.05, 0.0, 0.84)
     target: tuple[float, float, float] = (0.42, 0.0, 0.30)
     field_of_view: float = 40.0
     image_size: tuple[int, int] = (320, 240)
+    near: float = 0.05
     _up: tuple[float, float, float] = field(default=(0.0, 0.0, 1.0), repr=False)
 
     @cached_property
@@ -71,7 +73,7 @@ class Camera:
         """Return what the camera sees, RGB, shape [height, width, 3]; shadows are for people, and slow."""
         width, height = self.image_size
         view = pybullet.computeViewMatrix(self.eye, self.target, self._up)
-        projection = pybullet.computeProjectionMatrixFOV(self.field_of_view, width / height, _NEAR, _FAR)
+        projection = pybullet.computeProjectionMatrixFOV(self.field_of_view, width / height, self.near, _FAR)
         _, _, pixels, _, _ = pybullet.getCameraImage(
             width,
             height,

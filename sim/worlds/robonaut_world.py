@@ -18,8 +18,10 @@ from atg_fg.senses.tags import DetectedTag
 from atg_fg.worlds.arcube import ACTION_SOURCES, SUCCESSORS, Cube, rotation_of, shown_pattern
 from atg_fg.worlds.arcube_world import ARcubeWorld
 from sim.bodies.cube import CUBE_CENTRE, nearest_orientation
+from sim.bodies.prepared_robot import PreparedRobot
 from sim.manipulation.execution import Manipulator, OutOfReachError
 from sim.manipulation.impedance_control import ArmController
+from sim.manipulation.preparation import prepared
 from sim.vision.camera import Camera
 from sim.vision.cube_pose import CubePose, cube_pose
 from sim.vision.tag_detection import detect_markers, detected_symbols, draw_detections
@@ -43,6 +45,7 @@ LARGEST_OFFSET: Final = 0.03
 _FIELD_OF_VIEW: Final = 40.0  # degrees, vertical
 
 
+_NEAR: Final = 0.25  # m from the eye: beyond the visor, before the hands
 _SETTLING: Final = 0.25  # s
 
 
@@ -76,7 +79,7 @@ class RobonautARcubeWorld(ARcubeWorld):
     Args:
         cubes: As for ``ARcubeWorld``.
         condition: Name of a condition in ``sim.worlds.domain_randomization``.
-        urdf: A user's own description of the robot, instead of the shell.
+        urdf: A user's own description of the robot, or one made ready, instead of the shell.
         image_size: (width, height) of the head camera's frame, pixels.
         render_mode: ``"rgb_array"``, seen by an observer; ``"head"``, the last frame of the head's camera;
             ``"detections"``, the same with the detected tags outlined; ``"rgb_array_list"``, a film of all that
@@ -99,7 +102,7 @@ class RobonautARcubeWorld(ARcubeWorld):
         cubes: Sequence[Cube] | None = None,
         *,
         condition: str = "nominal",
-        urdf: str | Path | None = None,
+        urdf: str | Path | PreparedRobot | None = None,
         image_size: tuple[int, int] = (320, 240),
         render_mode: str | None = None,
     ) -> None:
@@ -109,7 +112,7 @@ class RobonautARcubeWorld(ARcubeWorld):
         self.condition = condition_named(condition)
         self._image_size = checked_size(image_size)
         self.circumstances = Circumstances()
-        self._urdf = Path(urdf) if urdf is not None else None
+        self._robot = prepared(Path(urdf)) if isinstance(urdf, (str, Path)) else urdf
         self.object, self.orientation, self._position = 0, 0, CUBE_CENTRE
         self._build()
         self.camera = self._head_camera()
@@ -225,7 +228,7 @@ class RobonautARcubeWorld(ARcubeWorld):
 
     def _build(self) -> None:
         """Make the scene anew, and the robot's control of it."""
-        self.scene = Scene(self.circumstances, self._placed_cubes(), self._urdf)
+        self.scene = Scene(self.circumstances, self._placed_cubes(), self._robot)
         self.controller = ArmController(self.scene.robot, self.scene.advance)
         self.manipulator = Manipulator(self.controller, self._look_for_cube)
 
@@ -278,7 +281,7 @@ class RobonautARcubeWorld(ARcubeWorld):
     def _head_camera(self) -> Camera:
         eye, direction = self.scene.robot.eye()
         target = eye + direction
-        return Camera(tuple(eye.tolist()), tuple(target.tolist()), _FIELD_OF_VIEW, self._image_size)
+        return Camera(tuple(eye.tolist()), tuple(target.tolist()), _FIELD_OF_VIEW, self._image_size, _NEAR)
 
     def _observer(self) -> Camera:
         return OBSERVER

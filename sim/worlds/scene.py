@@ -5,7 +5,6 @@ from __future__ import annotations
 import weakref
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -14,25 +13,17 @@ import pybullet
 from atg_fg.core.patterns import FloatArray
 from atg_fg.worlds.arcube import Cube
 from sim.bodies.cube import CUBE_CENTRE, CUBE_SIZE, CubeBody
+from sim.bodies.prepared_robot import PreparedRobot
 from sim.bodies.robot import RobotBody
+from sim.bodies.tables import TABLE_MIDDLE, TABLE_SIZE, TABLE_TOP, slab, table_top
 from sim.manipulation.impedance_control import TIME_STEP
 from sim.worlds.domain_randomization import Circumstances
-
-TABLE_TOP: Final = float(CUBE_CENTRE[2]) - CUBE_SIZE / 2  # m
-
 
 #: From one table's middle to the next one's, m: the arms at work reach into no neighbour's place.
 STATION_SPACING: Final = 0.85
 
 
 _RAIL_SPARE: Final = 0.05  # m beyond the last stations
-
-
-#: Of a table, m: a wider one would be in the forearms' way.
-TABLE_SIZE: Final = (0.60, 0.60)
-
-
-_TABLE_MIDDLE: Final = 0.50
 
 
 _RAILS: Final = (-0.20, 0.12)  # m, under the robot's base
@@ -48,7 +39,7 @@ _STEPS_PER_SAMPLE: Final = 8
 _GRAVITY: Final = 9.81  # m/s²
 
 
-_WOOD, _STEEL, _FLOOR = [0.62, 0.46, 0.30, 1.0], [0.45, 0.46, 0.48, 1.0], [0.80, 0.82, 0.84, 1.0]
+_STEEL, _FLOOR = (0.45, 0.46, 0.48, 1.0), (0.80, 0.82, 0.84, 1.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +69,7 @@ class Scene:
     Args:
         circumstances: Masses, frictions, and how the floor leans.
         cubes: One a station; the robot begins at the first.
-        urdf: A user's own description of the robot.
+        robot: The robot, instead of the shell.
 
     Attributes:
         cubes: One a station.
@@ -94,7 +85,7 @@ class Scene:
         self,
         circumstances: Circumstances,
         cubes: Sequence[PlacedCube],
-        urdf: Path | None = None,
+        robot: PreparedRobot | None = None,
     ) -> None:
         self.client: int = pybullet.connect(pybullet.DIRECT)
         # A scene that nobody closes must not keep its client until the process ends.
@@ -111,12 +102,12 @@ class Scene:
         self.on_step: Callable[[], None] | None = None
         middle = (len(cubes) - 1) / 2
         self._origins = [np.array([0.0, STATION_SPACING * (middle - station), 0.0]) for station in range(len(cubes))]
-        self._slab([4.0, 4.0, 0.01], [0.0, 0.0, -0.51], _FLOOR)
+        slab(self.client, [4.0, 4.0, 0.01], [0.0, 0.0, -0.51], _FLOOR)
         self.tables = [self._build_table(origin) for origin in self._origins]
         self.cubes: list[CubeBody] = []
         for _ in cubes:
             self.cubes.append(CubeBody(self.client, circumstances.cube_mass, self.cubes[0] if self.cubes else None))
-        self.robot = RobotBody(self.client, urdf, STATION_SPACING * middle + _RAIL_SPARE if len(cubes) > 1 else None)
+        self.robot = RobotBody(self.client, robot, STATION_SPACING * middle + _RAIL_SPARE if len(cubes) > 1 else None)
         if self.robot.rail is not None:
             self._draw_rails(STATION_SPACING * middle)
             self.robot.rail.reset(self.rail_position(0))
@@ -162,7 +153,7 @@ class Scene:
     def has_lost_the_cube(self, station: int | None = None) -> bool:
         """Whether a station's cube is off its table, or too far for the hands; by the simulator's truth."""
         (x, y, z), _ = self.cube_pose(station)
-        on_table = z > TABLE_TOP + 0.1 and max(abs(x - _TABLE_MIDDLE), abs(y)) < TABLE_SIZE[0] / 2
+        on_table = z > TABLE_TOP + 0.1 and max(abs(x - TABLE_MIDDLE), abs(y)) < TABLE_SIZE[0] / 2
         return not on_table or bool(np.hypot(x - CUBE_CENTRE[0], y) > 0.20)
 
     def save(self) -> int:
@@ -202,21 +193,11 @@ class Scene:
             )
 
     def _build_table(self, origin: FloatArray) -> int:
-        half, y = [TABLE_SIZE[0] / 2, TABLE_SIZE[1] / 2, 0.02], float(origin[1])
-        self._slab([0.05, 0.05, (TABLE_TOP + 0.46) / 2], [_TABLE_MIDDLE, y, (TABLE_TOP - 0.54) / 2], _STEEL)
-        return self._slab(half, [_TABLE_MIDDLE, y, TABLE_TOP - half[2]], _WOOD)
+        y = float(origin[1])
+        foot = [TABLE_MIDDLE, y, (TABLE_TOP - 0.54) / 2]
+        slab(self.client, [0.05, 0.05, (TABLE_TOP + 0.46) / 2], foot, _STEEL)
+        return table_top(self.client, y)
 
     def _draw_rails(self, reach: float) -> None:
         for x in _RAILS:
-            self._slab([0.02, reach + 0.35, 0.0075], [x, 0.0, -0.4925], _STEEL, solid=False)
-
-    def _slab(self, half_size: list[float], position: list[float], colour: list[float], *, solid: bool = True) -> int:
-        seen = pybullet.createVisualShape(
-            pybullet.GEOM_BOX, halfExtents=half_size, rgbaColor=colour, physicsClientId=self.client
-        )
-        touched = -1
-        if solid:
-            touched = pybullet.createCollisionShape(
-                pybullet.GEOM_BOX, halfExtents=half_size, physicsClientId=self.client
-            )
-        return int(pybullet.createMultiBody(0, touched, seen, position, physicsClientId=self.client))
+            slab(self.client, [0.02, reach + 0.35, 0.0075], [x, 0.0, -0.4925], _STEEL, solid=False)

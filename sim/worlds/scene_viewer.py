@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atg_fg.worlds.arcube import Cube
-from sim.bodies.urdf_writer import write_robot
 from sim.manipulation.impedance_control import TIME_STEP
 from sim.vision.camera import Camera
 from sim.worlds.rerun_entities import log_camera, log_cube, log_links, log_pose, log_shapes, log_world
@@ -76,7 +75,8 @@ class SceneViewer:
         """Log what stays the same in all scenes: the looks of the robot, and the tables."""
         with tempfile.TemporaryDirectory(prefix="robonaut-") as folder:
             # The meshes of the shell were written for PyBullet to read, and are gone.
-            write_robot(Path(folder))
+            for name, content in scene.robot.model.meshes.items():
+                (Path(folder) / name).write_text(content)
             log_shapes(self._recording, "world/robot", scene.client, scene.robot.body, Path(folder))
         for station, table in enumerate(scene.tables):
             log_shapes(self._recording, f"world/table_{station}", scene.client, table)

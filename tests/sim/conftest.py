@@ -1,9 +1,8 @@
 import pybullet
 import pytest
 
+from sim.bodies.prepared_robot import shell
 from sim.bodies.robot import RobotBody
-from sim.bodies.urdf_reader import read_description
-from sim.bodies.urdf_writer import write_robot
 from sim.manipulation.impedance_control import TIME_STEP
 
 
@@ -23,5 +22,5 @@ def robot(client):
 
 
 @pytest.fixture(scope="session")
-def kinematics(tmp_path_factory):
-    return read_description(write_robot(tmp_path_factory.mktemp("robot"))).kinematics()
+def kinematics():
+    return shell().kinematics

@@ -4,8 +4,8 @@ import pytest
 from hypothesis import given
 
 from sim.bodies.kinematics import cross
+from sim.bodies.prepared_robot import HOME_POSTURE
 from sim.bodies.robonaut_joints import ARM_AXIS, PAD_OFFSET, SIDES, arm
-from sim.bodies.robot import HOME_POSTURE
 from tests.sim.postures import MIRROR, shares, within_limits
 
 STEP = 1e-6  # rad

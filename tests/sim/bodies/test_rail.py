@@ -4,9 +4,9 @@ import numpy as np
 import pybullet
 import pytest
 
-from atg_fg.core.errors import InvalidInputError
+from sim.bodies.prepared_robot import HOME_POSTURE, TUCKED_POSTURE, like_the_shell
 from sim.bodies.rail import RAIL_FORCE, RAIL_SPEED
-from sim.bodies.robot import HOME_POSTURE, TUCKED_POSTURE, RobotBody
+from sim.bodies.robot import RobotBody
 from sim.manipulation.impedance_control import TIME_STEP
 from tests.sim import descriptions
 from tests.sim.descriptions import written
@@ -72,14 +72,14 @@ def test_the_robots_own_frame_slides_with_it(robot, client):
 
 def test_a_users_description_is_put_on_a_rail_as_it_lies(client, tmp_path):
     tree = descriptions.mounted(descriptions.slashed(descriptions.parsed()))
-    shell, own = RobotBody(client, rail_reach=REACH), RobotBody(client, written(tree, tmp_path), REACH)
+    shell, own = RobotBody(client, rail_reach=REACH), RobotBody(client, like_the_shell(written(tree, tmp_path)), REACH)
     for robot in (shell, own):
         robot.rail.reset(-0.6)
     np.testing.assert_allclose(own.eye(), shell.eye(), atol=1e-6)
     np.testing.assert_allclose(own.place, shell.place)
     np.testing.assert_allclose(own.gravity_torques(HOME_POSTURE), shell.gravity_torques(HOME_POSTURE), atol=1e-4)
     pads = [
-        pybullet.getLinkState(robot.body, robot.hands[0][-1], computeForwardKinematics=1, physicsClientId=client)[4]
+        pybullet.getLinkState(robot.body, robot.hands[0], computeForwardKinematics=1, physicsClientId=client)[4]
         for robot in (shell, own)
     ]
     np.testing.assert_allclose(*pads, atol=1e-6)
@@ -94,20 +94,7 @@ def test_meshes_are_found_where_pybullet_would_find_them(client, tmp_path):
     written(tree, tmp_path / "meshes")
     path = tmp_path / "urdf" / "own.urdf"
     path.write_bytes(ElementTree.tostring(tree))
-    own, shell = RobotBody(client, path, REACH), RobotBody(client)
+    own, shell = RobotBody(client, like_the_shell(path), REACH), RobotBody(client)
     assert len(pybullet.getVisualShapeData(own.body, physicsClientId=client)) == len(
         pybullet.getVisualShapeData(shell.body, physicsClientId=client)
     )
-
-
-def test_an_error_names_the_users_file(client, tmp_path):
-    tree = descriptions.parsed()
-    for mesh in tree.iter("mesh"):
-        mesh.set("filename", "nowhere.stl")
-    for collision in tree.iter("collision"):
-        geometry = collision.find("geometry")
-        geometry.clear()
-        ElementTree.SubElement(geometry, "mesh", filename="nowhere.stl")
-    path = written(tree, tmp_path)
-    with pytest.raises(InvalidInputError, match=str(path)):
-        RobotBody(client, path, REACH)

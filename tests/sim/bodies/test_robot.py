@@ -6,8 +6,9 @@ import pytest
 
 from atg_fg.core.errors import InvalidInputError
 from sim.bodies.cube import CUBE_CENTRE
+from sim.bodies.prepared_robot import HOME_POSTURE, like_the_shell
 from sim.bodies.robonaut_joints import NECK, SIDES, WAIST, arm, arm_joint_names
-from sim.bodies.robot import HOME_POSTURE, RobotBody
+from sim.bodies.robot import RobotBody
 from sim.manipulation.inverse_kinematics import HandTask, solve
 from sim.manipulation.waypoints import INWARD
 from tests.sim import descriptions
@@ -127,7 +128,7 @@ def test_what_holds_the_arms_against_gravity_is_the_slope_of_their_potential_ene
 
 
 def test_gravity_is_known_to_a_robot_whose_file_has_it_lie_on_its_side(client, tmp_path):
-    robot = RobotBody(client, written(descriptions.mounted(descriptions.parsed()), tmp_path))
+    robot = RobotBody(client, like_the_shell(written(descriptions.mounted(descriptions.parsed()), tmp_path)))
     expected = slopes_of_potential_energy(robot, HOME_POSTURE)
     np.testing.assert_allclose(robot.gravity_torques(HOME_POSTURE), expected, atol=1e-3)
 
@@ -156,7 +157,7 @@ def test_lower_limits_of_a_file_win_and_higher_ones_do_not(client, tmp_path):
     joint(tree, "r2/right_arm/joint2").find("limit").set("velocity", "900")
     # A token value, as descriptions have it for what nobody measured.
     joint(tree, "r2/right_arm/joint3").find("limit").set("effort", "0")
-    robot = RobotBody(client, written(tree, tmp_path))
+    robot = RobotBody(client, like_the_shell(written(tree, tmp_path)))
     effort = np.array([[joint.effort for joint in arm(side)] for side in SIDES])
     velocity = np.array([[joint.velocity for joint in arm(side)] for side in SIDES])
     effort[0, 3], velocity[1, 0] = 12.5, 0.75
@@ -166,14 +167,14 @@ def test_lower_limits_of_a_file_win_and_higher_ones_do_not(client, tmp_path):
 
 def test_pads_get_the_friction_that_is_asked_for_and_nothing_else_does(robot):
     robot.set_pad_friction(0.37, 0.011)
-    hands = {link for hand in robot.hands for link in hand}
+    hands = set(robot.hands)
     for link in range(pybullet.getNumJoints(robot.body, physicsClientId=robot.client)):
         info = pybullet.getDynamicsInfo(robot.body, link, physicsClientId=robot.client)
         assert ((info[1], info[7]) == (pytest.approx(0.37), pytest.approx(0.011))) == (link in hands)
 
 
 def test_a_hand_is_the_wrists_last_link(robot):
-    assert robot.hands == tuple([robot.joints[arm_joint_names(side)[-1]]] for side in SIDES)
+    assert robot.hands == tuple(robot.joints[arm_joint_names(side)[-1]] for side in SIDES)
 
 
 @pytest.mark.parametrize("side", [0, 1])
@@ -193,9 +194,9 @@ def test_a_robot_without_its_meshes_is_refused(client, tmp_path):
     for mesh in tree.iter("mesh"):
         mesh.set("filename", "package://robot/lost.stl")
     path = written(tree, tmp_path)
-    with pytest.raises(InvalidInputError, match="expected a robot's description with its meshes") as caught:
-        RobotBody(client, path)
-    assert str(caught.value).startswith(f"{path}: cannot be loaded")
+    with pytest.raises(InvalidInputError, match=r"lost\.stl' is no file in the folders about it") as caught:
+        like_the_shell(path)
+    assert str(caught.value).startswith(f"{path}: ")
 
 
 def test_meshes_named_by_their_package_are_found_in_the_folders_about_the_file(client, tmp_path):
@@ -208,7 +209,7 @@ def test_meshes_named_by_their_package_are_found_in_the_folders_about_the_file(c
     path = written(tree, package / "urdf")
     for mesh in path.parent.glob("*.obj"):
         mesh.rename(package / "meshes" / mesh.name)
-    robot = RobotBody(client, path)
+    robot = RobotBody(client, like_the_shell(path))
     assert robot.state()[0].tolist() == HOME_POSTURE.tolist()
 
 
@@ -218,4 +219,4 @@ def test_links_may_overlap_about_their_joint(client, tmp_path):
     geometry = ElementTree.SubElement(ElementTree.SubElement(forearm, "collision"), "geometry")
     # The upper arm ends 9 cm from the forearm's joint.
     ElementTree.SubElement(geometry, "sphere", radius="0.12")
-    assert touching(RobotBody(client, written(tree, tmp_path)), LEFT_ARM, RIGHT_ARM) == set()
+    assert touching(RobotBody(client, like_the_shell(written(tree, tmp_path))), LEFT_ARM, RIGHT_ARM) == set()

@@ -2,7 +2,7 @@ import numpy as np
 import pybullet
 import pytest
 
-from sim.bodies.robot import HOME_POSTURE
+from sim.bodies.prepared_robot import HOME_POSTURE
 from sim.manipulation.impedance_control import TIME_STEP, ArmController, JointTarget
 
 

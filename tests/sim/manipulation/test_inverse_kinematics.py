@@ -4,8 +4,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
-from sim.bodies.kinematics import ArmKinematics
-from sim.bodies.robot import HOME_POSTURE
+from sim.bodies.prepared_robot import HOME_POSTURE
 from sim.manipulation.inverse_kinematics import HandTask, Solution, solve
 from tests.sim.postures import angle_between, shares, within_limits
 
@@ -101,7 +100,7 @@ def test_palms_turn_to_where_they_shall_point(kinematics):
 
 def test_a_palm_that_cannot_be_turned_far_enough_is_told_as_an_error(kinematics):
     near = (HOME_POSTURE - 0.3, HOME_POSTURE + 0.3)
-    stiff = ArmKinematics(kinematics.positions, kinematics.axes, *near)
+    stiff = kinematics.limited(*near)
     task = home_task(kinematics, palm=-DOWN)
     assert solve(kinematics, task, HOME_POSTURE, HOME_POSTURE).reaches()
     solution = solve(stiff, task, HOME_POSTURE, HOME_POSTURE)

@@ -8,13 +8,14 @@ from hypothesis import strategies as st
 
 from atg_fg.worlds.arcube import ACTION_SOURCES, SUCCESSORS, rotation_of
 from sim.bodies.cube import CUBE_CENTRE, nearest_orientation
-from sim.bodies.robot import HOME_POSTURE
+from sim.bodies.prepared_robot import HOME_POSTURE
 from sim.manipulation import waypoints as plans
 from sim.manipulation.inverse_kinematics import solve
 from sim.manipulation.waypoints import INWARD, Waypoint, about_vertical, towards_robot
 from sim.vision.cube_pose import CubePose
 
 STILL = np.zeros((2, 3))
+PADS = np.full(2, 0.05)
 QUARTERS = {"flip": towards_robot(np.pi / 2), "left": about_vertical(np.pi / 2), "right": about_vertical(-np.pi / 2)}
 LEFT, RIGHT = 1, -1
 
@@ -177,7 +178,7 @@ def test_every_waypoint_takes_time_and_a_true_rotation(plan):
 
 
 def test_pads_are_nineteen_centimetres_and_the_clearance_from_the_centre_on_either_side():
-    task = Waypoint("approach", np.array([0.42, 0.0, 0.30]), np.eye(3), 0.02, 1.0).task(STILL)
+    task = Waypoint("approach", np.array([0.42, 0.0, 0.30]), np.eye(3), 0.02, 1.0).task(STILL, PADS)
     np.testing.assert_allclose(task.pad, [[0.42, 0.21, 0.30], [0.42, -0.21, 0.30]])
     np.testing.assert_allclose(task.normal, [[0, -1, 0], [0, 1, 0]])
     np.testing.assert_allclose(task.palm, [[0, 0, -1], [0, 0, -1]])
@@ -186,12 +187,12 @@ def test_pads_are_nineteen_centimetres_and_the_clearance_from_the_centre_on_eith
 def test_hands_go_round_with_the_cube():
     position = np.array([0.42, 0.0, 0.30])
     # The left face comes to the front, and with it the left hand.
-    turned = Waypoint("turn", position, about_vertical(np.pi / 2), -0.002, 1.0, flips=False).task(STILL)
+    turned = Waypoint("turn", position, about_vertical(np.pi / 2), -0.002, 1.0, flips=False).task(STILL, PADS)
     np.testing.assert_allclose(turned.pad, [[0.232, 0, 0.30], [0.608, 0, 0.30]], atol=1e-12)
     np.testing.assert_allclose(turned.normal, [[1, 0, 0], [-1, 0, 0]], atol=1e-12)
     assert turned.palm is None
     # The bottom goes to the back, and with it the palms.
-    flipped = Waypoint("turn", position, towards_robot(np.pi / 2), 0.0, 1.0).task(STILL)
+    flipped = Waypoint("turn", position, towards_robot(np.pi / 2), 0.0, 1.0).task(STILL, PADS)
     np.testing.assert_allclose(flipped.pad, [[0.42, 0.19, 0.30], [0.42, -0.19, 0.30]], atol=1e-12)
     np.testing.assert_allclose(flipped.palm, [[1, 0, 0], [1, 0, 0]], atol=1e-12)
 
@@ -199,11 +200,11 @@ def test_hands_go_round_with_the_cube():
 def test_what_the_pads_have_rolled_is_counted_in_the_cubes_frame():
     rolled = np.array([[0.01, 0.0, 0.003], [-0.02, 0.0, 0.0]])
     waypoint = Waypoint("turn", np.array([0.42, 0.0, 0.30]), about_vertical(np.pi / 2), 0.0, 1.0)
-    np.testing.assert_allclose(waypoint.task(rolled).pad, [[0.23, 0.01, 0.303], [0.61, -0.02, 0.30]], atol=1e-12)
+    np.testing.assert_allclose(waypoint.task(rolled, PADS).pad, [[0.23, 0.01, 0.303], [0.61, -0.02, 0.30]], atol=1e-12)
 
 
 def test_a_yaw_lets_the_hands_lean_further_than_a_flip():
-    cones = [Waypoint("", CUBE_CENTRE, np.eye(3), 0, 1, flips).task(STILL).cone for flips in (True, False)]
+    cones = [Waypoint("", CUBE_CENTRE, np.eye(3), 0, 1, flips).task(STILL, PADS).cone for flips in (True, False)]
     assert 0 < cones[0] < cones[1] < np.pi / 2
 
 
@@ -235,7 +236,7 @@ def followed(kinematics, waypoints, angles):
     """Solve for each way-point from the one before; return the largest miss with a grip (m) and the last angles."""
     worst = 0.0
     for waypoint in waypoints:
-        solution = solve(kinematics, waypoint.task(STILL), angles, HOME_POSTURE)
+        solution = solve(kinematics, waypoint.task(STILL, PADS), angles, HOME_POSTURE)
         angles = solution.angles
         assert (angles >= kinematics.lower).all()
         assert (angles <= kinematics.upper).all()

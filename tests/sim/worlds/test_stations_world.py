@@ -12,8 +12,9 @@ from atg_fg.worlds.arcube_world import ARcubeWorld
 from atg_fg.worlds.stations import AtStation, StationsWorld, make_stations
 from sim.bodies.cube import CUBE_SIZE
 from sim.bodies.rail import RAIL_FORCE, RAIL_SPEED
+from sim.bodies.tables import TABLE_SIZE
 from sim.vision.tag_detection import detect_markers
-from sim.worlds.scene import STATION_SPACING, TABLE_SIZE
+from sim.worlds.scene import STATION_SPACING
 from sim.worlds.stations_world import RobonautTableWorld
 from tests.sim import descriptions
 from tests.sim.descriptions import written
