@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from atg_fg.core.assumptions import MAX_NUMBER
+from atg_fg.core.checks import whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.storage.checked_json import parse_json
@@ -71,23 +73,30 @@ def read_counts(files: Sequence[Path]) -> Counts:
     """
     total = Counts(0, 0, 0, 0, 0)
     for file in files:
-        document = parse_json(read_text_file(file), str(file))
-        try:
-            total += _counts(document)
-        except (KeyError, TypeError) as error:
-            raise InvalidInputError(f"{file}: {error}; expected what atg-fg sim reliability --json writes") from error
+        total += _counts(parse_json(read_text_file(file), str(file)), str(file))
     return total
 
 
-def _counts(document: Any) -> Counts:
-    failures, detection = document["failures"], document["detection"]
-    return Counts(
-        actions=document["success"]["of"] - failures["lost"],
-        failed=failures["stayed"] + failures["another_orientation"],
-        looks=detection["both"]["of"],
-        wrong=detection["wrong_ids"]["count"],
-        missing=detection["one"]["count"] + 2 * detection["none"]["count"],
+def _counts(document: Any, place: str) -> Counts:
+    def count(*keys: str) -> int:
+        value = document
+        for key in keys:
+            if not isinstance(value, dict) or key not in value:
+                where = f"{place}: {'.'.join(keys)} is missing"
+                raise InvalidInputError(f"{where}; expected what atg-fg sim reliability --json writes")
+            value = value[key]
+        return whole_number(value, f"{place}: {'.'.join(keys)}", most=MAX_NUMBER)
+
+    counts = Counts(
+        actions=count("success", "of") - count("failures", "lost"),
+        failed=count("failures", "stayed") + count("failures", "another_orientation"),
+        looks=count("detection", "both", "of"),
+        wrong=count("detection", "wrong_ids", "count"),
+        missing=count("detection", "one", "count") + 2 * count("detection", "none", "count"),
     )
+    if counts.failed > counts.actions or counts.wrong > counts.looks or counts.missing > 2 * counts.looks:
+        raise InvalidInputError(f"{place}: {counts}; expected no more failures than there were actions and looks")
+    return counts
 
 
 def _jeffreys(count: int, total: int) -> float:

@@ -90,7 +90,10 @@ def as_policy(given: Any, place: str = "policy") -> Policy:
     Raises:
         InvalidInputError: It is none of these; the message begins with ``place``.
     """
-    made = given() if isinstance(given, type) else given
+    try:
+        made = given() if isinstance(given, type) else given
+    except TypeError as error:
+        raise InvalidInputError(f"{place}: cannot be made without arguments: {error}; expected an object") from error
     if callable(getattr(made, "choose", None)):
         policy: Policy = made
         return policy
@@ -111,6 +114,10 @@ def imported_policy(name: str) -> Policy:
         InvalidInputError: There is no such module or object, or it can be no policy.
     """
     module, _, attribute = name.partition(":")
+    if not all(word.isidentifier() for word in module.split(".")):
+        raise InvalidInputError(
+            f"policy {name!r}: cannot be imported: no name of a module; expected module:object, on Python's path"
+        )
     try:
         found = importlib.import_module(module)
     except (ImportError, ValueError) as error:

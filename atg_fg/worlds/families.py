@@ -8,6 +8,7 @@ from typing import Any, Final, TypeAlias
 
 import numpy as np
 
+from atg_fg.core.checks import number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import Pattern, PatternAlphabet
 from atg_fg.worlds.arcube import ACTION_SOURCES, BACK, FACES, FRONT, N_TAGS, ORIENTATIONS, SUCCESSORS, shown_pattern
@@ -45,6 +46,7 @@ def hexagonal_prisms(n_objects: int, seed: int, *, n_symbols: int = 12) -> Objec
     A prism stands on an end with a side in front, or lies with an end in front and a side on top: 24 states.
     """
     _check_count("n_symbols", n_symbols, _N_SIDES + 2)
+    alphabet = PatternAlphabet(("front", "top"), n_symbols)
     states, mechanism = closed_mechanism((True, 0, 0), (_tip, partial(_roll, 1), partial(_roll, -1)))
 
     def draw(rng: np.random.Generator) -> FiniteObject:
@@ -53,8 +55,7 @@ def hexagonal_prisms(n_objects: int, seed: int, *, n_symbols: int = 12) -> Objec
         shown = ((standing, sides[side], ends[end]) for standing, side, end in states)
         return FiniteObject(mechanism, tuple((side, end) if standing else (end, side) for standing, side, end in shown))
 
-    objects = _different(n_objects, draw, _generator(seed))
-    return ObjectFamily(_CUBE_ACTIONS, PatternAlphabet(("front", "top"), n_symbols), objects)
+    return ObjectFamily(_CUBE_ACTIONS, alphabet, _different(n_objects, draw, _generator(seed)))
 
 
 #: Whether a prism stands, the side in front (on top, if it lies), and the end on top (in front, if it lies).
@@ -224,8 +225,8 @@ def _random_atg(alphabet: PatternAlphabet, n_aspects: int, n_successors: int, co
     """Return what draws a random ATG, once its options are checked."""
     _check_count("n_aspects", n_aspects, 1, len(alphabet))
     _check_count("n_successors", n_successors, 1, n_aspects)
-    if isinstance(concentration, str) or not 0 < concentration < np.inf:
-        raise InvalidInputError(f"concentration: {concentration!r}; expected a finite number above 0")
+    # Beyond these bounds the draws are no longer numbers.
+    number(concentration, "concentration", least=1e-6, most=1e6)
     shape = (n_aspects, len(_CUBE_ACTIONS))
 
     def draw(rng: np.random.Generator) -> FiniteObject:

@@ -11,7 +11,7 @@ from typing import Any, Final
 import gymnasium
 
 from atg_fg.core.assumptions import Assumptions, arcube_assumptions
-from atg_fg.core.errors import InvalidInputError, unknown_name
+from atg_fg.core.errors import AtgError, InvalidInputError, unknown_name
 from atg_fg.worlds.arcube import make_arcubes
 from atg_fg.worlds.base import World
 
@@ -34,7 +34,13 @@ WORLDS: Final[dict[str, str]] = {
 ARCUBE_WORLDS: Final = ("ideal", "rendered", "robonaut")
 
 
-def make_world(name: str, **options: Any) -> World:
+#: What ``gymnasium.make`` takes for itself, and what says which world of this project it is.
+_NOT_OPTIONS: Final = frozenset(
+    {"id", "max_episode_steps", "disable_env_checker", "additional_wrappers", "vectorization_mode", "family"}
+)
+
+
+def make_world(name: str, /, **options: Any) -> World:
     """Return the world registered as ``name`` (or any ``module:namespace/Id-v0`` of a user's own).
 
     Raises:
@@ -43,25 +49,43 @@ def make_world(name: str, **options: Any) -> World:
     """
     if name not in WORLDS and ":" not in name:
         raise unknown_name("world", name, WORLDS)
+    for option in _NOT_OPTIONS & options.keys():
+        raise InvalidInputError(f"world {name!r}: option {option!r}: expected an option of the world's own")
+    module, _, environment = name.partition(":")
+    if name not in WORLDS and not (is_dotted_name(module) and environment and ":" not in environment):
+        raise InvalidInputError(
+            f"world {name!r}: cannot be made: expected module:namespace/Id-v0, with a module on Python's path"
+        )
     try:
         return gymnasium.make(WORLDS.get(name, name), disable_env_checker=True, **options)
-    except (gymnasium.error.Error, ModuleNotFoundError, TypeError) as error:
-        if isinstance(error, TypeError) and "unexpected keyword argument" not in str(error):
+    except AtgError:
+        raise
+    except (gymnasium.error.Error, ModuleNotFoundError, TypeError, ValueError, OverflowError, AttributeError) as error:
+        of_options = name in WORLDS or "unexpected keyword argument" in str(error)
+        if isinstance(error, (TypeError, ValueError, OverflowError, AttributeError)) and not of_options:
             raise  # a fault of the world's own
         raise InvalidInputError(f"world {name!r}: cannot be made: {error}") from error
 
 
-def make_world_with(name: str, n_objects: int, seed: int, **options: Any) -> World:
+def make_world_with(name: str, n_objects: int, seed: int, /, **options: Any) -> World:
     """Return the world registered as ``name`` with ``n_objects`` objects drawn by ``seed``; a user's own has its own.
 
     Raises:
         InvalidInputError: As for ``make_world``.
     """
+    objects: dict[str, Any] = {}
     if name in ARCUBE_WORLDS:
-        return make_world(name, cubes=make_arcubes(n_objects, seed), **options)
-    if name in WORLDS:
-        return make_world(name, n_objects=n_objects, objects_seed=seed, **options)
-    return make_world(name, **options)
+        objects = {"cubes": make_arcubes(n_objects, seed)}
+    elif name in WORLDS:
+        objects = {"n_objects": n_objects, "objects_seed": seed}
+    for option in objects.keys() & options.keys():
+        raise InvalidInputError(f"world {name!r}: option {option!r}: is given already; expected another option")
+    return make_world(name, **objects, **options)
+
+
+def is_dotted_name(text: str) -> bool:
+    """Return whether a text can be the name of a module: words with dots between them."""
+    return all(word.isidentifier() for word in text.split("."))
 
 
 def assumptions_of(world: World, n_objects: int) -> Assumptions:

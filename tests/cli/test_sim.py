@@ -1,4 +1,8 @@
 import json
+import subprocess
+import sys
+
+import pytest
 
 from atg_fg.storage.presets import preset
 
@@ -60,3 +64,32 @@ def test_a_table_on_the_robot_is_recorded_and_gone_on_with(run, refused, tmp_pat
     assert (status, again) == (0, whole)
     assert "--resume: no records" in refused("table1", "--resume")
     assert "cannot be made" in refused("table1", "--condition", "worn", "--jobs", 1)
+
+
+COUNTS = {
+    "success": {"of": 10},
+    "failures": {"lost": 1, "stayed": 2, "another_orientation": 1},
+    "detection": {"both": {"of": 20}, "wrong_ids": {"count": 1}, "one": {"count": 2}, "none": {"count": 1}},
+}
+
+
+def test_calibration_needs_no_simulator(tmp_path):
+    (tmp_path / "counts.json").write_text(json.dumps(COUNTS))
+    code = "import sys; sys.modules.update(pybullet=None, cv2=None); from atg_fg.cli import main; main()"
+    words = ["sim", "calibrate", tmp_path / "counts.json", "--output", tmp_path / "preset.json"]
+    subprocess.run([sys.executable, "-c", code, *map(str, words)], check=True)
+    assert preset(str(tmp_path / "preset.json")).observation_noise > 0
+
+
+@pytest.mark.parametrize("value", [None, "many", 1.5, -1, 10**400, [], {}, True, 2**53 + 1, 10**6])
+def test_counts_that_are_none_are_refused(refused, tmp_path, value):
+    file, output = tmp_path / "counts.json", tmp_path / "preset.json"
+    for place in (("failures", "stayed"), ("detection", "one", "count"), ("detection", "wrong_ids"), ("success",)):
+        document = json.loads(json.dumps(COUNTS))
+        holder = document
+        for key in place[:-1]:
+            holder = holder[key]
+        holder[place[-1]] = value
+        file.write_text(json.dumps(document))
+        assert "counts.json: " in refused("sim", "calibrate", file, "--output", output)
+        assert not output.exists()

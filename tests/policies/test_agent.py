@@ -151,6 +151,10 @@ def test_a_policy_of_ones_own_goes_by_module_and_name():
     [
         ("nowhere:agent", "policy 'nowhere:agent': cannot be imported: No module named 'nowhere'"),
         (":agent", "policy ':agent': cannot be imported"),
+        (".a:b", "policy '.a:b': cannot be imported"),
+        (".:x", "policy '.:x': cannot be imported"),
+        ("a b:c", "policy 'a b:c': cannot be imported"),
+        ("atg_fg.policies:GoalPolicy", "cannot be made without arguments"),
         ("own_policies:", "own_policies has no ''; expected module:object"),
         ("own_policies:other", "own_policies has no 'other'; expected module:object"),
         ("own_policies:nothing", "policy 'own_policies:nothing': 3; expected an object with choose"),

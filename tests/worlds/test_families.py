@@ -211,7 +211,7 @@ class TestRandomGraphs:
             ({"n_symbols": 1}, "n_symbols: 1; expected a whole number of at least 2"),
             ({"n_successors": 0}, "n_successors: 0; expected a whole number from 1 to 24"),
             ({"n_successors": 25}, "n_successors: 25; expected a whole number from 1 to 24"),
-            ({"concentration": 0.0}, "concentration: 0.0; expected a finite number above 0"),
+            ({"concentration": 0.0}, "concentration: 0.0; expected a finite number from 1e-06"),
             ({"concentration": float("nan")}, "concentration: nan"),
             ({"concentration": float("inf")}, "concentration: inf"),
             ({"concentration": "1"}, "concentration: '1'"),

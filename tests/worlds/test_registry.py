@@ -7,12 +7,12 @@ import pytest
 from gymnasium.utils.env_checker import check_env
 
 from atg_fg.core.assumptions import arcube_assumptions
-from atg_fg.core.errors import InvalidInputError, UnknownNameError
+from atg_fg.core.errors import AtgError, InvalidInputError, UnknownNameError
 from atg_fg.core.patterns import MISSING, Evidence
 from atg_fg.worlds.arcube import SUCCESSORS, make_arcubes, shown_pattern
 from atg_fg.worlds.arcube_world import ARcubeWorld
 from atg_fg.worlds.base import detection_of
-from atg_fg.worlds.registry import make_world
+from atg_fg.worlds.registry import WORLDS, make_world, make_world_with
 
 CUBES = make_arcubes(3, seed=1)
 N_STEPS = 4000
@@ -55,6 +55,60 @@ def test_an_unknown_world_is_refused_with_the_names_there_are() -> None:
         make_world("atg_fg:atg_fg/Moon-v0")
     with pytest.raises(InvalidInputError, match="cannot be made"):
         make_world("no_such_module:moon/Moon-v0")
+
+
+@pytest.mark.parametrize("name", [":", "a:b:c", ".:x", "..:y", "a:", ":x", "a b:c", "\0:x", "1:2", "atg_fg:atg_fg/A:B"])
+def test_a_name_of_no_form_is_refused_before_anything_is_imported(name: str) -> None:
+    with pytest.raises(InvalidInputError, match="cannot be made"):
+        make_world(name)
+
+
+#: What ``json.loads`` can make of an option's text.
+ODD = (
+    None,
+    True,
+    "x",
+    "",
+    [],
+    [1],
+    {},
+    {"a": 1},
+    float("inf"),
+    float("nan"),
+    10**400,
+    -1,
+    1e308,
+    10**12,
+    "\ud800",
+    2.5,
+)
+
+
+@pytest.mark.filterwarnings("ignore:.*render_mode")  # Gymnasium's own, of modes that a world does not know
+@pytest.mark.parametrize("name", [name for name, place in WORLDS.items() if place.startswith("atg_fg")])
+def test_an_option_of_any_value_is_taken_or_refused_in_one_line(name: str) -> None:
+    own = ("slip", "n_symbols", "n_rings", "n_aspects", "n_slots", "n_successors", "concentration", "share")
+    given = ("cubes", "n_objects", "objects_seed", "render_mode", "name", "seed", "id", "max_episode_steps", "family")
+    for option in (*own, *given, "disable_env_checker", "additional_wrappers", "self", "options", "no_such"):
+        for value in ODD:
+            try:
+                world = make_world_with(name, 4, 0, **{option: value})
+            except AtgError as error:
+                assert "\n" not in str(error)  # noqa: PT017
+            else:
+                world.reset(seed=0)
+                world.step(np.int64(0))
+                world.close()
+
+
+def test_a_fault_in_a_world_of_the_users_own_is_shown_as_it_is() -> None:
+    gymnasium.register(id="faulty/World-v0", entry_point=f"{__name__}:faulty_world")
+    with pytest.raises(ZeroDivisionError):
+        make_world(f"{__name__}:faulty/World-v0")
+
+
+def faulty_world() -> None:
+    raise ZeroDivisionError
 
 
 @pytest.mark.parametrize("option", ["slip", "wrong", "missing"])
