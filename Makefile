@@ -3,35 +3,69 @@ PYTHON ?= $(shell command -v python3.11 || command -v python3)
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+# What the demo needs, and nothing else; all of it is a part of READY.
+DEMO_READY := $(if $(wildcard $(READY)),$(READY),$(VENV)/.ready-demo)
+PEERS := .venv-peers
+PEERS_READY := $(PEERS)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help setup demo test test-all torture lint format notebooks docs bench results results-engines results-robot results-goal \
+.PHONY: help setup peers demo test test-all test-peers torture package lint format notebooks docs bench results results-engines results-robot results-goal \
 	results-structure example-memory tour clean
 
 help:  ## Say what there is to make
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
 
-setup: $(READY)  ## Install everything into .venv
+setup: $(READY)  ## Install into .venv what users and developers need
+
+$(VENV)/.ready-demo: pyproject.toml
+	$(PYTHON) -m venv $(VENV)
+	$(BIN)/python -m pip install --quiet --editable '.[sim,viz]'
+	$(without_samples)
+	touch $@
+
+# The sample models in PyBullet's wheel are 140 MB, and nothing here uses them.
+without_samples = rm -rf $(VENV)/lib/python3*/site-packages/pybullet_data
 
 # --group needs pip 25.1.
 $(READY): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1'
-	$(BIN)/python -m pip install --quiet --editable '.[sim,vision,viz,print,report,viewer,notebooks]' \
+	$(BIN)/python -m pip install --quiet --editable '.[learning,sim,vision,viz,print,report,viewer,notebooks]' \
 		--group test --group dev --group docs
+	$(without_samples)
 	touch $@
 
-demo: $(READY)  ## Let the robot recognise an object by turning it over, told step by step and filmed
+# PyTorch comes first, and at a version, so that pip takes a build for the processor where it is told of one.
+TORCH ?= torch==2.13.0
+$(PEERS_READY): pyproject.toml
+	$(PYTHON) -m venv $(PEERS)
+	$(PEERS)/bin/python -m pip install --quiet --upgrade 'pip>=25.1'
+	$(PEERS)/bin/python -m pip install --quiet '$(TORCH)'
+	$(PEERS)/bin/python -m pip install --quiet --editable '.[bench,agents,viz,notebooks]' --group test
+	touch $@
+
+peers: $(PEERS_READY)  ## Install into .venv-peers the libraries that tests compare with
+
+demo: $(DEMO_READY)  ## Let the robot recognise an object by turning it over, told step by step and filmed
 	$(BIN)/atg-fg demo
 
 test: $(READY)  ## Run the tests
 	$(BIN)/python -m pytest -n auto --dist loadfile
 
 test-all: $(READY)  ## Run the tests, slow ones too
-	$(BIN)/python -m pytest -n auto --dist loadfile -m ''
+	$(BIN)/python -m pytest -n auto --dist loadfile -m 'not peers'
+
+test-peers: $(PEERS_READY)  ## Run the tests beside other libraries (JAX, pgmpy, pymdp, Stable-Baselines3), in .venv-peers
+	$(PEERS)/bin/python -m pytest -m peers tests/benchmarks/test_peers.py tests/experiments/test_recognition_agent.py \
+		tests/test_guides.py
 
 torture: $(READY)  ## Kill writers, fill disks, damage files, and look at what is left (some ten minutes on 2 cores)
 	$(BIN)/python -m tests.torture --kills 1000 --files 20000
+
+package: $(READY)  ## Build the wheel and the sdist in dist, and try the wheel in an empty environment outside the tree
+	rm -rf dist
+	$(BIN)/python -m build --quiet
+	$(BIN)/python -m tests.package
 
 lint: $(READY)  ## Check style, types, and that packages import only what stands on lower floors
 	$(BIN)/ruff check .
@@ -151,4 +185,4 @@ tour: $(READY)  ## Run the commands of docs/tour.md and write down what they pri
 	$(BIN)/python docs/tour.py
 
 clean:  ## Remove what make has made
-	rm -rf $(VENV) out build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) $(PEERS) out build dist .pytest_cache .mypy_cache .ruff_cache .hypothesis

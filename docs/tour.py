@@ -23,7 +23,7 @@ PAGE: Final = ROOT / "docs" / "tour.md"
 CUT: Final = "..."
 _BLOCK: Final = re.compile(r"```console\n(?P<text>.*?)```\n(?P<times>\n\*Takes [^*]+\*\n)?", re.DOTALL)
 #: A terminal of always the same kind.
-_ENVIRONMENT: Final = {"COLUMNS": "110", "NO_COLOR": "1", "TERM": "dumb"}
+ENVIRONMENT: Final = {"COLUMNS": "110", "NO_COLOR": "1", "TERM": "dumb"}
 
 
 @dataclass
@@ -62,7 +62,7 @@ def run(line: str, folder: Path, *more: str) -> subprocess.CompletedProcess[str]
     return subprocess.run(
         [Path(sys.executable).with_name(program), *arguments, *more],
         cwd=folder,
-        env={**os.environ, **_ENVIRONMENT},
+        env={**os.environ, **ENVIRONMENT},
         capture_output=True,
         text=True,
         check=False,

@@ -100,6 +100,7 @@ def test_the_loops_of_the_document_on_agents_run(capsys):
     assert variables["agent"].trials == []
 
 
+@pytest.mark.peers
 @pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::FutureWarning", "ignore::UserWarning")
 def test_an_agent_of_stable_baselines3_is_trained_and_scored(tmp_path, monkeypatch, capsys):
     pytest.importorskip("stable_baselines3", reason="Stable-Baselines3 is not installed: pip install atg-fg[agents]")

@@ -12,10 +12,17 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any, NamedTuple, TypeVar
 
-import numba
 import numpy as np
 
+from atg_fg.core.errors import MissingDependencyError
 from atg_fg.core.patterns import FloatArray, IntArray
+
+try:
+    import numba
+except ImportError as error:
+    raise MissingDependencyError(
+        'learning: Numba is not installed; expected it from: pip install "atg-fg[learning]"'
+    ) from error
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 

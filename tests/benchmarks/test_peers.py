@@ -53,7 +53,9 @@ def looks_of(memory, parameters, peer):
 
 
 @pytest.mark.parametrize("parameters", PARAMETERS)
-@pytest.mark.parametrize("name", peers.PEERS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(name, marks=() if name == "pyAgrum" else pytest.mark.peers) for name in peers.PEERS]
+)
 def test_a_peer_gives_the_same_identity_and_expected_entropies(name, parameters, memory, quiet):
     peer = peer_or_skip(name, dense_model(memory, parameters))
     for inference in looks_of(memory, parameters, peer):
@@ -66,6 +68,7 @@ def test_a_peer_gives_the_same_identity_and_expected_entropies(name, parameters,
             np.testing.assert_allclose(expected, inference.expected_entropies(), atol=TOLERANCE, rtol=0)
 
 
+@pytest.mark.peers
 @pytest.mark.parametrize("parameters", PARAMETERS)
 def test_pymdp_scores_actions_by_information_on_object_and_aspect(parameters, memory, quiet):
     model = dense_model(memory, parameters)

@@ -132,6 +132,7 @@ def test_what_makes_no_sense_is_refused(memory):
 
 
 # torch and pandas have warnings of their own when they are loaded.
+@pytest.mark.peers
 @pytest.mark.filterwarnings("ignore")
 def test_stable_baselines3_evaluates_it(memory):
     evaluation = pytest.importorskip(
