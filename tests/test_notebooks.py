@@ -9,6 +9,8 @@ import pytest
 
 FOLDER = Path(__file__).parents[1] / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
+#: Those that run for half a minute.
+LONG = ("03", "07", "08")
 
 
 @pytest.fixture(scope="module")
@@ -29,7 +31,11 @@ def test_there_are_these_notebooks_in_reading_order():
 # A kernel's sockets are closed by its own threads, some time after the test; that is none of this project's.
 @pytest.mark.filterwarnings("ignore::ResourceWarning", "ignore::pytest.PytestUnraisableExceptionWarning")
 @pytest.mark.filterwarnings("ignore::DeprecationWarning:zmq", "ignore::RuntimeWarning:zmq")
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+@pytest.mark.parametrize(
+    "path",
+    [pytest.param(each, marks=pytest.mark.slow if each.stem.startswith(LONG) else ()) for each in NOTEBOOKS],
+    ids=lambda path: path.stem,
+)
 def test_a_notebook_runs_from_its_first_cell_to_its_last(path, execute):
     before = path.read_bytes()
     notebook = execute.executed(path)

@@ -4,6 +4,7 @@ import os
 import signal
 import subprocess
 import sys
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -12,13 +13,16 @@ from atg_fg import cli
 from atg_fg.storage.trial_log import read_log
 from tests.dask_cluster import ROOT, wait_for
 
+slow = pytest.mark.slow
+#: Two tests that are soon over.
+SHORT_TABLE1 = ["table1", "--engine", "bayes-filter", "--tests", "2", "--trials", "8", "--actions", "4"]
 #: Two tests that take long enough to be met in the middle, even on a quick machine.
 TABLE1 = ["table1", "--engine", "gtsam", "--tests", "2", "--trials", "20", "--actions", "4"]
 FIGURE3 = ["figure3", "--actions", "2:5", "--tests", "3", "--trials", "40"]
 ABLATION = ["ablation", "--variants", "paper;learned", "--noises", "ideal", "--actions", "2,3", "--tests", "2"]
 ABLATION += ["--trials", "5"]
 GOAL = ["goal", "--engine", "bayes-filter", "--memory-cubes", "6", "--learning-actions", "8", "--trials", "3"]
-RECORDED = {"table1": TABLE1, "goal": GOAL}
+RECORDED = {"short table1": SHORT_TABLE1, "table1": TABLE1, "goal": GOAL}
 LOGGED = {"figure3": FIGURE3, "ablation": ABLATION}
 
 
@@ -67,18 +71,21 @@ def contents(folder):
 
 @pytest.fixture(scope="module")
 def serial(tmp_path_factory):
-    """What each command comes to, one piece after the other: its JSON, and its records."""
+    """What a command comes to, one piece after the other: its JSON, and its records."""
     folder = tmp_path_factory.mktemp("serial")
-    files = {}
-    for name, command in {**RECORDED, **LOGGED}.items():
+
+    @cache
+    def files_of(name):
+        command = {**RECORDED, **LOGGED}[name]
         kept = ["--records", folder / name] if name in RECORDED else []
         arguments = [*command, "--jobs", "1", "--json", folder / f"{name}.json", *kept]
         with pytest.MonkeyPatch.context() as patch:
             patch.setattr(sys, "argv", ["atg-fg", *map(str, arguments)])
             with pytest.raises(SystemExit, match="0"):
                 cli.main()
-        files[name] = (folder / f"{name}.json").read_bytes(), contents(folder / name) if kept else None
-    return files
+        return (folder / f"{name}.json").read_bytes(), contents(folder / name) if kept else None
+
+    return files_of
 
 
 def where(name, request):
@@ -90,10 +97,10 @@ def where(name, request):
 @pytest.mark.parametrize(
     ("name", "executor"),
     [
-        *(("table1", executor) for executor in ("process", "thread", "dask")),
+        *(("short table1", executor) for executor in ("process", "thread", "dask")),
         ("goal", "process"),
-        ("figure3", "dask"),
-        ("ablation", "thread"),
+        pytest.param("figure3", "dask", marks=slow),
+        pytest.param("ablation", "thread", marks=slow),
     ],
 )
 def test_the_result_is_that_of_a_serial_run_byte_for_byte(name, executor, serial, run, tmp_path, request):
@@ -101,12 +108,12 @@ def test_the_result_is_that_of_a_serial_run_byte_for_byte(name, executor, serial
     command = {**RECORDED, **LOGGED}[name]
     status, _, error = run(*command, *where(executor, request), *kept, "--json", tmp_path / "json")
     assert (status, error) == (0, "")
-    json, records = serial[name]
+    json, records = serial(name)
     assert (tmp_path / "json").read_bytes() == json
     assert records is None or contents(tmp_path / "kept") == records
 
 
-@pytest.mark.parametrize("executor", ["process", "thread", "dask"])
+@pytest.mark.parametrize("executor", ["process", pytest.param("thread", marks=slow), pytest.param("dask", marks=slow)])
 def test_ctrl_c_leaves_what_is_finished_and_resume_goes_on(executor, serial, tmp_path, request):
     records = tmp_path / "records"
     command = [*TABLE1, *where(executor, request), "--records", records, "--json", tmp_path / "json"]
@@ -118,9 +125,10 @@ def test_ctrl_c_leaves_what_is_finished_and_resume_goes_on(executor, serial, tmp
     assert not (tmp_path / "json").exists()
     status, _, error = finish(begin(*command, "--resume"))
     assert (status, error) == (0, "")
-    assert ((tmp_path / "json").read_bytes(), contents(records)) == serial["table1"]
+    assert ((tmp_path / "json").read_bytes(), contents(records)) == serial("table1")
 
 
+@slow
 def test_tests_in_a_log_outlive_ctrl_c(serial, tmp_path):
     log = tmp_path / "log.jsonl"
     command = [*FIGURE3, "--jobs", 2, "--log", log, "--json", tmp_path / "json"]
@@ -135,7 +143,7 @@ def test_tests_in_a_log_outlive_ctrl_c(serial, tmp_path):
     assert (status, error) == (0, "")
     assert log.read_bytes().startswith(kept)
     assert len(log.read_bytes().splitlines()) == 25
-    assert (tmp_path / "json").read_bytes() == serial["figure3"][0]
+    assert (tmp_path / "json").read_bytes() == serial("figure3")[0]
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="finds processes in /proc")
@@ -147,8 +155,9 @@ class TestKilled:
         os.kill(workers_of(process)[0], signal.SIGKILL)
         status, _, error = finish(process)
         assert (status, error) == (0, "")
-        assert ((tmp_path / "json").read_bytes(), contents(records)) == serial["table1"]
+        assert ((tmp_path / "json").read_bytes(), contents(records)) == serial("table1")
 
+    @slow
     def test_workers_leave_with_a_command_that_is_killed(self, serial, tmp_path):
         records = tmp_path / "records"
         command = [*TABLE1, "--jobs", 2, "--records", records, "--json", tmp_path / "json"]
@@ -159,7 +168,7 @@ class TestKilled:
         process.communicate()
         wait_for(lambda: nobody_left(process.pid))
         assert finish(begin(*command, "--resume"))[0] == 0
-        assert ((tmp_path / "json").read_bytes(), contents(records)) == serial["table1"]
+        assert ((tmp_path / "json").read_bytes(), contents(records)) == serial("table1")
 
 
 @pytest.mark.parametrize("command", ["table1", "figure3", "ablation", "goal"])
@@ -179,4 +188,4 @@ def test_without_dask_the_line_says_which_extra_to_install(refused, monkeypatch)
 def test_the_log_of_other_tests_is_refused(run, refused, tmp_path):
     command = ["figure3", "--actions", "2", "--tests", "1", "--trials", "2", "--jobs", "1", "--log", tmp_path / "log"]
     assert run(*command)[0] == 0
-    assert "expected the log of a Figure 3 with such tests" in refused(*command, "--slip", "0.1")
+    assert "; expected the log of a Figure 3 of {" in refused(*command, "--slip", "0.1")

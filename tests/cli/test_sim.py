@@ -32,6 +32,7 @@ def test_json_alone_goes_to_standard_output(run):
     assert json.loads(output)["success"]["of"] == 1
 
 
+@pytest.mark.slow
 def test_pictures_and_a_film_are_written(run, tmp_path):
     picture, film, table = tmp_path / "robot.png", tmp_path / "robot.gif", tmp_path / "table.png"
     status, _, error = run("sim", "picture", "--output", picture, "--film", film, "--table", table)

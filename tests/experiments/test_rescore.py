@@ -54,6 +54,7 @@ def test_what_the_robot_recorded_gives_the_scores_that_were_reported(preset_name
     assert (again.lost, again.undecided) == (reported["lost"], reported["undecided"])
 
 
+@pytest.mark.slow
 def test_learned_structure_is_no_worse_on_the_robots_evidence():
     path = RECORDED / "worn_default" / "test-0000.jsonl.gz"
     default, learned = (

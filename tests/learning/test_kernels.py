@@ -113,6 +113,7 @@ def test_a_trial_move_draws_from_the_conditional_distribution():
     assert np.abs(counts / 4000 - expected).max() < 4 * np.sqrt(0.25 / 4000)
 
 
+@pytest.mark.slow
 def test_paths_with_slips_are_all_there_and_weigh_what_enumeration_says():
     trials = drawn_trials(np.random.default_rng(6), n_trials=2)
     chain, _ = chain_of(trials, [0, -1], [1, 0])
@@ -153,6 +154,7 @@ def test_evidence_of_register_maps_is_that_of_their_states():
     assert total == pytest.approx(fresh.sum(), abs=1e-12)
 
 
+@pytest.mark.slow
 def test_annealed_maps_find_the_ring():
     rng = np.random.default_rng(8)
     recording, _ = simulated(rng, n_trials=12, n_looks=8, contents=[(0, 1, 2), (2, 1, 0), (1, 0, 2), (0, 0, 1)])
@@ -180,6 +182,7 @@ def simulated(rng, n_trials, n_looks, contents, wrong=0.0):
     return Recording(labels, np.full(labels.shape, np.nan), actions, lengths, 3), np.arange(n_trials) % len(contents)
 
 
+@pytest.mark.slow
 def test_sampling_from_the_joint_and_from_its_conditionals_agree():
     """Geweke's test: data drawn anew between the moves leave the prior of partitions and of starts as it was."""
     rng, n_trials, n_looks = np.random.default_rng(9), 3, 3
@@ -214,6 +217,7 @@ def test_sampling_from_the_joint_and_from_its_conditionals_agree():
     assert np.abs(starts / starts.sum() - 1 / 3).max() < 4 * np.sqrt(0.25 * 20 / n_rounds)
 
 
+@pytest.mark.slow
 def test_probability_of_novelty_is_calibrated():
     """Of the last trials that are judged novel with probability p, the share p is of an object not met before."""
     rng, noise = np.random.default_rng(10), DetectorNoise.unknown(3)

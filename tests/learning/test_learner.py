@@ -48,6 +48,7 @@ def test_of_half_and_half_each_object_is_told_apart():
     assert learner.rates.share == pytest.approx(0.5, abs=0.15)
 
 
+@pytest.mark.slow
 def test_rates_are_learned_with_the_structure():
     rng = np.random.default_rng(2)
     order = rng.integers(20, size=40)
@@ -66,6 +67,7 @@ def test_structure_and_contents_come_of_looks_with_gaps():
     assert (best.contents.max(axis=2) > 0.9).mean() > 0.85
 
 
+@pytest.mark.slow
 def test_tags_that_come_twice_are_learned():
     beside = {b for a, b in CUBE.poses().registers[:, :2].tolist() if a == 0}
     (opposite,) = set(range(1, 6)) - beside

@@ -106,6 +106,7 @@ def test_what_is_no_reliability_run_is_refused_by_name(tmp_path, text):
         read_counts([file])
 
 
+@pytest.mark.slow
 def test_a_run_is_the_same_for_any_number_of_processes():
     one, two = (run_actions("nominal", 3, seed=1, jobs=jobs) for jobs in (1, 2))
     assert [run.actions for run in one] == [run.actions for run in two]

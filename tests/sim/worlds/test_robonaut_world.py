@@ -205,6 +205,7 @@ def test_pictures_are_of_the_sizes_they_should_be(make):
     assert world.render() is None
 
 
+@pytest.mark.slow
 def test_a_film_shows_the_action_once(make):
     world = make(render_mode="rgb_array_list")
     world.reset(seed=0)
