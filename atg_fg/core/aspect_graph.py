@@ -9,6 +9,7 @@ import networkx
 import numpy as np
 
 from atg_fg.core.assumptions import MAX_NUMBER, Assumptions
+from atg_fg.core.checks import whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import IntArray, Pattern
 from atg_fg.core.table import Cell, Table, shortened, symbols_text
@@ -107,21 +108,19 @@ class AspectTransitionGraph:
             InvalidInputError: An aspect or action that is not there, or a count below one.
         """
         for role, aspect in (("source", source), ("target", target)):
-            if isinstance(aspect, bool) or not isinstance(aspect, int) or not 0 <= aspect < self.n_known:
+            if not self.n_known:
                 raise InvalidInputError(
-                    f"{self.name}: {role} aspect {aspect!r}; expected 0 to {self.n_known - 1}"
-                    if self.n_known
-                    else f"{self.name}: {role} aspect {aspect!r}; expected no transition, since no aspect is known"
+                    f"{self.name}: {role} aspect {aspect!r}; expected no transition, since no aspect is known"
                 )
-        if isinstance(action, bool) or not isinstance(action, int) or not 0 <= action < len(self.assumptions.actions):
-            raise InvalidInputError(
-                f"{self.name}: action {action!r}; expected 0 to {len(self.assumptions.actions) - 1}"
-            )
-        if isinstance(count, bool) or not isinstance(count, int) or not 1 <= count <= MAX_NUMBER:
-            raise InvalidInputError(f"{self.name}: count {count!r}; expected a whole number from 1 to 2^53")
-        edge = (source, action, target)
-        self._counts[edge] = self._counts.get(edge, 0) + count
+            whole_number(aspect, f"{self.name}: {role} aspect", 0, self.n_known - 1)
+        self._check_action(action)
+        whole_number(count, f"{self.name}: count", 1, MAX_NUMBER)
+        edge = (int(source), int(action), int(target))
+        self._counts[edge] = self._counts.get(edge, 0) + int(count)
         self._count_table = None
+
+    def _check_action(self, action: int) -> None:
+        whole_number(action, f"{self.name}: action", 0, len(self.assumptions.actions) - 1)
 
     def learn(self, patterns: Sequence[int | None], actions: Sequence[int]) -> None:
         """Extend the graph by what a trial showed.
@@ -137,12 +136,11 @@ class AspectTransitionGraph:
             raise InvalidInputError(
                 f"{self.name}: {len(patterns)} observations, {len(actions)} actions; expected one observation more"
             )
-        n_patterns = len(self.assumptions.alphabet)
         for pattern in patterns:
-            if pattern is not None and not 0 <= pattern < n_patterns:
-                raise InvalidInputError(
-                    f"{self.name}: pattern {pattern!r}; expected an index from 0 to {n_patterns - 1}"
-                )
+            if pattern is not None:
+                whole_number(pattern, f"{self.name}: pattern", 0, len(self.assumptions.alphabet) - 1)
+        for action in actions:
+            self._check_action(action)
         aspects = [self._aspect_for(pattern) for pattern in patterns]
         for source, action, target in zip(aspects, actions, aspects[1:], strict=False):
             if source is not None and target is not None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from atg_fg.core.checks import distinct_names, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import PatternAlphabet
 
@@ -32,13 +33,8 @@ class Assumptions:
 
     def __post_init__(self) -> None:
         for field in ("n_objects", "n_aspects"):
-            value = getattr(self, field)
-            if isinstance(value, bool) or not isinstance(value, int) or not 1 <= value <= MAX_NUMBER:
-                raise InvalidInputError(f"{field}: {value!r}; expected a whole number from 1 to 2^53")
-        if isinstance(self.actions, str) or not all(isinstance(name, str) for name in self.actions):
-            raise InvalidInputError(f"actions: {self.actions!r}; expected a tuple of names")
-        if not self.actions or len(set(self.actions)) != len(self.actions):
-            raise InvalidInputError(f"actions: {list(self.actions)!r}; expected at least one name, all different")
+            object.__setattr__(self, field, whole_number(getattr(self, field), field, 1, MAX_NUMBER))
+        object.__setattr__(self, "actions", distinct_names(self.actions, "actions"))
         if self.n_aspects > len(self.alphabet):
             raise InvalidInputError(
                 f"n_aspects: {self.n_aspects}; expected at most the {len(self.alphabet)} patterns there are, "

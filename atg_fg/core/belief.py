@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.log_math import x_log_x
-from atg_fg.core.patterns import FloatArray
+from atg_fg.core.patterns import FloatArray, read_only
 from atg_fg.core.table import Bar, Cell, Table
 
 #: Objects that a table shows one by one.
@@ -22,7 +22,7 @@ class IdentityBelief:
     """p(O | z, a), normalised.
 
     Attributes:
-        objects: Probability of each remembered object (eq. 2), shape [K].
+        objects: Probability of each remembered object (eq. 2), shape [K]; its own copy, which cannot be written to.
         unseen: Probability that the object was never met (eq. 1).
         n_unseen: U, how many objects *unseen* stands for.
     """
@@ -30,6 +30,12 @@ class IdentityBelief:
     objects: FloatArray
     unseen: float
     n_unseen: int
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "objects", read_only(np.array(self.objects, dtype=np.float64)))
+
+    def __reduce__(self) -> tuple[type, tuple[Any, ...]]:
+        return IdentityBelief, (self.objects, self.unseen, self.n_unseen)  # so that no copy can be written to, either
 
     @classmethod
     def of(cls, probabilities: FloatArray, n_unseen: int) -> IdentityBelief:

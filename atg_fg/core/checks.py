@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -46,6 +46,14 @@ def one_of(value: Any, place: str, known: Collection[str]) -> str:
     if not isinstance(value, str) or value not in known:
         raise InvalidInputError(f"{place}: {brief(value)}; expected one of: {', '.join(known)}")
     return value
+
+
+def distinct_names(value: Any, place: str) -> tuple[str, ...]:
+    """Return ``value`` as a tuple, or raise ``InvalidInputError`` unless it is a sequence of different names."""
+    is_sequence = isinstance(value, Sequence) and not isinstance(value, str)
+    if not is_sequence or not value or not all(isinstance(name, str) for name in value) or len(set(value)) < len(value):
+        raise InvalidInputError(f"{place}: {brief(value)}; expected at least one name, all different")
+    return tuple(value)
 
 
 def plain_text(value: Any, place: str) -> str:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atg_fg.core.errors import InvalidInputError, unknown_name
-from atg_fg.core.patterns import Detection, PatternAlphabet
+from atg_fg.core.patterns import Detection, PatternAlphabet, read_only
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Goal:
         for slot, symbol in enumerate(self.symbols):
             if symbol is not None:
                 shows &= self.alphabet.symbols[:, slot] == symbol
-        return shows
+        return read_only(shows)
 
     def likeness(self, pattern: int) -> int:
         """Return in how many of the slots that matter the pattern with this index is as wanted."""

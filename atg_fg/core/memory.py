@@ -71,7 +71,13 @@ class RobotMemory(Persistent):
             patterns: Index of the pattern seen at each time, ``None`` where it was not complete, length t + 1.
             actions: Index of the action between each two, length t.
             matched: Name of the ATG to extend, or ``None`` if the object was judged novel.
+
+        Raises:
+            UnknownNameError: There is no such ATG.
+            InvalidInputError: Lengths or indices that do not fit, or a novel object of which no pattern was seen whole.
         """
+        if matched is None and all(pattern is None for pattern in patterns):
+            raise InvalidInputError("learn: no pattern was seen whole; expected at least one of a novel object")
         graph = AspectTransitionGraph(self._new_name(), self.assumptions) if matched is None else self[matched].copy()
         graph.learn(patterns, actions)
         self._graphs[graph.name] = graph

@@ -8,14 +8,15 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Final, TypeAlias
+from typing import Any, Final, TypeAlias, TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from atg_fg.core.checks import distinct_names, whole_number
 from atg_fg.core.errors import InvalidInputError
 
 FloatArray: TypeAlias = NDArray[np.float64]
@@ -30,11 +31,29 @@ Pattern: TypeAlias = tuple[int, ...]
 Detection: TypeAlias = tuple[int | None, ...]
 
 
+Array = TypeVar("Array", bound=NDArray[Any])
+
+
 #: What stands in an array for the symbol of a slot where nothing was detected.
 MISSING: Final = -1
 
 
 MAX_PATTERNS: Final = 100_000
+
+
+def read_only(array: Array) -> Array:
+    """Return an array after making it one that cannot be written to."""
+    array.setflags(write=False)
+    return array
+
+
+def protect(values: Iterable[Any]) -> None:
+    """Make the arrays among some values, and in tuples among them, such that they cannot be written to."""
+    for value in values:
+        if isinstance(value, np.ndarray):
+            read_only(value)
+        elif isinstance(value, tuple):
+            protect(value)
 
 
 @dataclass(frozen=True)
@@ -54,12 +73,8 @@ class PatternAlphabet:
     n_symbols: int
 
     def __post_init__(self) -> None:
-        if not self.slots or len(set(self.slots)) != len(self.slots):
-            raise InvalidInputError(f"slots: {list(self.slots)!r}; expected at least one name, all different")
-        if isinstance(self.slots, str) or not all(isinstance(slot, str) for slot in self.slots):
-            raise InvalidInputError(f"slots: {self.slots!r}; expected a tuple of names")
-        if isinstance(self.n_symbols, bool) or not isinstance(self.n_symbols, int):
-            raise InvalidInputError(f"n_symbols: {self.n_symbols!r}; expected a whole number")
+        object.__setattr__(self, "slots", distinct_names(self.slots, "slots"))
+        object.__setattr__(self, "n_symbols", whole_number(self.n_symbols, "n_symbols"))
         if self.n_symbols < len(self.slots):
             raise InvalidInputError(
                 f"n_symbols: {self.n_symbols}; expected at least one symbol for each of {len(self.slots)} slots"
@@ -85,7 +100,7 @@ class PatternAlphabet:
     @cached_property
     def symbols(self) -> IntArray:
         """Symbols of every pattern, shape [|𝒵|, slots]."""
-        return np.array(self.patterns, dtype=np.int64)
+        return read_only(np.array(self.patterns, dtype=np.int64))
 
     @cached_property
     def _index_of(self) -> dict[Detection, int]:
@@ -133,12 +148,19 @@ class Evidence:
     """What one look says about the pattern shown: a likelihood of each pattern.
 
     Attributes:
-        likelihood: Non-negative weights, shape [|𝒵|]; 1 where a detection agrees, 0 where not.
+        likelihood: Non-negative weights, shape [|𝒵|]; 1 where a detection agrees, 0 where not. A copy of its own, which
+            cannot be written to.
         pattern: Index of the pattern if the detection was complete, else ``None``.
     """
 
     likelihood: FloatArray
     pattern: int | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "likelihood", read_only(np.array(self.likelihood, dtype=np.float64)))
+
+    def __reduce__(self) -> tuple[type, tuple[Any, ...]]:
+        return Evidence, (self.likelihood, self.pattern)  # so that no copy can be written to, either
 
     @classmethod
     def of_detection(cls, alphabet: PatternAlphabet, detection: Sequence[int | None]) -> Evidence:
@@ -184,3 +206,5 @@ class Evidence:
             raise InvalidInputError(
                 f"evidence: least {self.likelihood.min()}, sum {total}; expected non-negative numbers with a finite sum"
             )
+        if self.pattern is not None:
+            whole_number(self.pattern, "evidence: pattern", 0, n_patterns - 1)

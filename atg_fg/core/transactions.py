@@ -51,6 +51,9 @@ class Persistent:
 
     _keeper: Keeper | None = None
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_keeper": None}  # a copy is in no file
+
     @property
     def is_kept(self) -> bool:
         """Whether there is a file that keeps what this memory learns."""

@@ -100,4 +100,5 @@ def begin_trial(
     begin: Callable[..., Inference] = ENGINES[engine]
     inference = begin(TrialSetup(memory, parameters, prior), **options)
     inference.options = options
+    inference._protect()
     return inference

@@ -49,7 +49,7 @@ class Enumeration(Inference):
 
     def _identity_of(self, weights: FloatArray) -> IdentityBelief:
         by_object = weights.reshape(len(weights), -1).sum(axis=1) / weights.sum()
-        return IdentityBelief(by_object[:-1], float(by_object[-1]), self.model.n_unseen)
+        return IdentityBelief.of(by_object, self.model.n_unseen)
 
     def _look(self, evidence: Evidence) -> None:
         weights = self._times_last(self.weights, self.model.likelihood(evidence))

@@ -36,7 +36,7 @@ class FilterInference(Inference):
     def identity(self) -> IdentityBelief:
         """Return p(O | z_0:t, a_1:t) (eq. 1 and 2)."""
         probabilities = np.exp(self._belief.log_identity)
-        return IdentityBelief(probabilities[:-1], float(probabilities[-1]), self.model.n_unseen)
+        return IdentityBelief.of(probabilities, self.model.n_unseen)
 
     @property
     def log_evidence(self) -> float:

@@ -12,8 +12,8 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from atg_fg.core.checks import whole_number
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.engines.options import whole_number
 from atg_fg.engines.sampling import drawn, split_r_hat
 from atg_fg.engines.whole_trial import Posterior, WholeTrialInference
 from atg_fg.inference.chain import Chain, ForwardPass, forward_pass
@@ -68,10 +68,10 @@ class GibbsSampling(WholeTrialInference):
         seed: int = 0,
     ) -> None:
         super().__init__(setup)
-        self.n_chains = whole_number("n_chains", n_chains, 2)
-        self.n_sweeps = whole_number("n_sweeps", n_sweeps, 4)
-        self.n_burn_in = whole_number("n_burn_in", n_burn_in, 0)
-        self.seed = whole_number("seed", seed, 0)
+        self.n_chains = whole_number(n_chains, "n_chains", 2)
+        self.n_sweeps = whole_number(n_sweeps, "n_sweeps", 4)
+        self.n_burn_in = whole_number(n_burn_in, "n_burn_in", 0)
+        self.seed = whole_number(seed, "seed", 0)
         self._report = GibbsReport(1.0, 1.0)
 
     @property

@@ -8,7 +8,7 @@ does not know, nor the known ones that no edge leads to. ``atg_fg.engines.gtsam_
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -34,6 +34,9 @@ class GtsamElimination(FilterInference):
         super().__init__(setup)
         self._transitions: dict[int, TransitionFactors] = {}
         self._hypothetical: HypotheticalFactors | None = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**vars(self), "_transitions": {}, "_hypothetical": None}  # GTSAM's factors cannot be pickled
 
     def graph(self) -> RecognitionGraph:
         """Return the whole factor graph of the trial so far, with O, X0 … Xt."""

@@ -14,9 +14,9 @@ from typing import Any, ClassVar, Final
 import gtsam
 import numpy as np
 
+from atg_fg.core.checks import one_of
 from atg_fg.core.errors import TooLargeError
 from atg_fg.core.patterns import FloatArray
-from atg_fg.engines.options import one_of
 from atg_fg.engines.whole_trial import Posterior, WholeTrialInference, joint_of
 from atg_fg.inference import gtsam_factors as factors
 from atg_fg.inference.chain import Chain
@@ -150,7 +150,7 @@ class _OrderedRoute(GtsamRoute):
         ordering: str = "objects-last",
     ) -> None:
         super().__init__(setup)
-        self.ordering = one_of("ordering", ordering, ORDERINGS)
+        self.ordering = one_of(ordering, "ordering", ORDERINGS)
 
 
 class GtsamSequential(_OrderedRoute):

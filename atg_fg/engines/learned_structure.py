@@ -75,7 +75,7 @@ class LearnedStructure(BayesFilter):
         if not self._followed:
             return super().identity()
         probabilities = sum(self._type_beliefs(), np.zeros(self.model.n_hypotheses))
-        return IdentityBelief(probabilities[:-1], float(probabilities[-1]), self.model.n_unseen)
+        return IdentityBelief.of(probabilities, self.model.n_unseen)
 
     @property
     def log_evidence(self) -> float:

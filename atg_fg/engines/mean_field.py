@@ -16,9 +16,10 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from atg_fg.core.belief import IdentityBelief
+from atg_fg.core.checks import whole_number
 from atg_fg.core.log_math import log_sum_exp, x_log_x
 from atg_fg.core.patterns import Evidence, FloatArray
-from atg_fg.engines.options import number_between, whole_number
+from atg_fg.engines.options import number_between
 from atg_fg.engines.support import SupportedInference
 from atg_fg.inference.interface import TrialSetup
 
@@ -82,7 +83,7 @@ class MeanField(SupportedInference):
     ) -> None:
         super().__init__(setup)
         self.floor = number_between("floor", floor, 1e-300, 1e-3)
-        self.max_iterations = whole_number("max_iterations", max_iterations, 1)
+        self.max_iterations = whole_number(max_iterations, "max_iterations", 1)
         self.tolerance = number_between("tolerance", tolerance, 0.0, 1.0)
         self.objects: FloatArray = self.model.prior
         self.aspects: FloatArray = self.model.prior @ self.model.base_row
@@ -93,7 +94,7 @@ class MeanField(SupportedInference):
 
     def identity(self) -> IdentityBelief:
         """Return q(O)."""
-        return IdentityBelief(self.objects[:-1], float(self.objects[-1]), self.model.n_unseen)
+        return IdentityBelief.of(self.objects, self.model.n_unseen)
 
     @property
     def log_evidence(self) -> float:
@@ -103,7 +104,7 @@ class MeanField(SupportedInference):
     @property
     def aspect_belief(self) -> FloatArray:
         """q(O) q(X_t), shape [H, W]; after an action, what the next look finds."""
-        return self._predicted if self.history.awaits_evidence else np.outer(self.objects, self.aspects)
+        return self._predicted.copy() if self.history.awaits_evidence else np.outer(self.objects, self.aspects)
 
     def _look(self, evidence: Evidence) -> None:
         likelihood = self.model.likelihood(evidence)

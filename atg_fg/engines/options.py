@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import inspect
-from collections.abc import Collection, Iterable
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -26,24 +26,9 @@ def check_known(engine: type, name: str, options: Iterable[str]) -> None:
             raise InvalidInputError(f"engine {name!r}: unknown option {option!r}; expected {expected}")
 
 
-def whole_number(option: str, value: Any, least: int) -> int:
-    """Return ``value`` as an int, or raise ``InvalidInputError`` unless it is a whole number of at least ``least``."""
-    whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
-    if not whole or int(value) < least:
-        raise InvalidInputError(f"{option}: {value!r}; expected a whole number of at least {least}")
-    return int(value)
-
-
 def number_between(option: str, value: Any, least: float, below: float) -> float:
     """Return ``value`` as a float, or raise ``InvalidInputError`` unless ``least`` ≤ value < ``below``."""
     number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
     if not number or not least <= float(value) < below:
         raise InvalidInputError(f"{option}: {value!r}; expected a number from {least} to below {below}")
     return float(value)
-
-
-def one_of(option: str, value: str, known: Collection[str]) -> str:
-    """Return ``value``, or raise ``InvalidInputError`` unless it is one of ``known``."""
-    if value not in known:
-        raise InvalidInputError(f"{option}: {value!r}; expected one of: {', '.join(known)}")
-    return value

@@ -7,9 +7,9 @@ from typing import ClassVar
 import numpy as np
 
 from atg_fg.core.belief import IdentityBelief
+from atg_fg.core.checks import whole_number
 from atg_fg.core.log_math import log_of, log_sum_exp
 from atg_fg.core.patterns import Evidence, FloatArray, IntArray
-from atg_fg.engines.options import whole_number
 from atg_fg.engines.sampling import drawn
 from atg_fg.engines.support import SupportedInference
 from atg_fg.inference.chain import build_chain, forward_pass
@@ -57,8 +57,8 @@ class ParticleFilter(SupportedInference):
         seed: int = 0,
     ) -> None:
         super().__init__(setup)
-        self.n_particles = whole_number("n_particles", n_particles, 1)
-        self._rng = np.random.default_rng(whole_number("seed", seed, 0))
+        self.n_particles = whole_number(n_particles, "n_particles", 1)
+        self._rng = np.random.default_rng(whole_number(seed, "seed", 0))
         self.objects: IntArray = np.zeros(0, dtype=np.int64)
         self.aspects: IntArray = np.zeros(0, dtype=np.int64)
         self.weights: FloatArray = np.zeros(0)
@@ -76,7 +76,7 @@ class ParticleFilter(SupportedInference):
         probabilities: FloatArray = self.model.prior
         if len(self.weights):
             probabilities = np.bincount(self.objects, self.weights, self.model.n_hypotheses).astype(np.float64)
-        return IdentityBelief(probabilities[:-1], float(probabilities[-1]), self.model.n_unseen)
+        return IdentityBelief.of(probabilities, self.model.n_unseen)
 
     @property
     def log_evidence(self) -> float:
@@ -119,7 +119,9 @@ class ParticleFilter(SupportedInference):
         self._log_evidence += float(np.log(total) + np.log(greatest))
         alive = weights > 0
         rows = proposal[self.objects[alive], self.aspects[alive]]
-        self.aspects[alive] = drawn(rows, self._rng)
+        aspects = self.aspects.copy()
+        aspects[alive] = drawn(rows, self._rng)
+        self.aspects = aspects
         self.weights = weights / total
         if self.effective_sample_size < self.n_particles / 2:
             self._resample()

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from atg_fg.core.belief import IdentityBelief
-from atg_fg.core.patterns import Evidence, FloatArray
+from atg_fg.core.patterns import Evidence, FloatArray, protect
 from atg_fg.engines.support import SupportedInference
 from atg_fg.inference.chain import Chain
 from atg_fg.inference.interface import TrialSetup
@@ -40,12 +40,13 @@ class WholeTrialInference(SupportedInference):
         """What is inferred of the trial so far; before the first look it is the prior."""
         if self._posterior is None:
             self._posterior = self._solve_scaled() if self.history.evidence else self._prior()
+            protect(self._posterior)
         return self._posterior
 
     def identity(self) -> IdentityBelief:
         """Return p(O | z_0:t, a_1:t) (eq. 1 and 2)."""
         probabilities = self.posterior.identity
-        return IdentityBelief(probabilities[:-1], float(probabilities[-1]), self.model.n_unseen)
+        return IdentityBelief.of(probabilities, self.model.n_unseen)
 
     @property
     def log_evidence(self) -> float:

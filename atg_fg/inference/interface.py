@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
+from copy import copy, deepcopy
 from types import MappingProxyType
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from atg_fg.core.belief import SHOWN, BeliefTable, IdentityBelief
 from atg_fg.core.errors import ImpossibleEvidenceError, InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
-from atg_fg.core.patterns import Evidence, FloatArray
+from atg_fg.core.patterns import Evidence, FloatArray, protect
 from atg_fg.inference.belief_components import BeliefComponent, components_of, shown_patterns_of
 from atg_fg.inference.belief_tree import BeliefNode, TableBeliefNode
 from atg_fg.inference.chain import Chain, build_chain, forward_backward
@@ -45,6 +46,9 @@ class Inference(ABC):
     ``_expected_entropies`` and ``_smoothed_aspects``. Hooks are called once what was asked is known to make sense.
     Options of an engine are keyword-only arguments of its constructor.
 
+    What an engine hands out cannot change it: arrays in public attributes are made read-only after each step, so an
+    engine replaces them rather than write to them. A copy, shallow or deep, shares nothing with the engine.
+
     Args:
         setup: What the trial begins with.
 
@@ -68,6 +72,16 @@ class Inference(ABC):
         """Return the tables in force when the trial begins; an engine that does without some of them overrides this."""
         return RecognitionModel(self.memory, self.parameters, self.prior)
 
+    def _protect(self) -> None:
+        protect(value for name, value in vars(self).items() if not name.startswith("_"))
+
+    def __copy__(self) -> Self:
+        return deepcopy(self)
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        self._protect()
+
     def observe(self, evidence: Evidence) -> None:
         """Take in the evidence z_t of a look, then learn from it if the parameters say so.
 
@@ -84,6 +98,7 @@ class Inference(ABC):
         except BaseException:
             self.history.evidence.pop()
             raise
+        self._protect()
 
     def act(self, action: int) -> None:
         """Predict the effect of an action a_{t+1}.
@@ -102,6 +117,7 @@ class Inference(ABC):
         except BaseException:
             self.history.actions.pop()
             raise
+        self._protect()
 
     def expected_entropies(self) -> FloatArray:
         """E[H(O | z_{t+1}, a, …)] of each action (eq. 3) in nats, shape [A].
@@ -142,7 +158,7 @@ class Inference(ABC):
             InvalidInputError: Asked before a look or between an action and its look.
         """
         self._check_looked("belief tree")
-        return TableBeliefNode(self.model, self.aspect_belief)
+        return TableBeliefNode(copy(self.model), self.aspect_belief)
 
     def chain(self, hypothesis: int | None = None) -> Chain:
         """Return the trial so far as plain arrays, for all hypotheses or under one of them."""

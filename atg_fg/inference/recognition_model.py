@@ -23,7 +23,7 @@ from __future__ import annotations
 import math
 from copy import copy
 from itertools import chain
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +32,7 @@ from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.compact.columns import positions
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
-from atg_fg.core.patterns import Evidence, FloatArray, IntArray
+from atg_fg.core.patterns import Evidence, FloatArray, IntArray, protect
 from atg_fg.inference.counted_edges import Edges, Targets, distinct
 from atg_fg.inference.history import History
 
@@ -65,6 +65,8 @@ class Revelation(NamedTuple):
 
 class RecognitionModel:
     """The tables in force at one time of a trial; ``learn`` turns them into those of the next time.
+
+    No table can be written to: ``learn`` replaces them, so a shallow copy keeps those of its time.
 
     H = K + 1 hypotheses, W states (padded), A actions, |𝒵| patterns, E edge entries.
 
@@ -160,6 +162,7 @@ class RecognitionModel:
         )
         n_targets = np.bincount(row, minlength=self.n_actions * self.n_hypotheses).reshape(self.n_actions, -1)
         self.n_unreached = (self.n_known - n_targets).astype(np.float64)
+        protect(vars(self).values())
 
     def transition(self, action: int) -> FloatArray:
         """Return p(x' | x, a, i) with its padding, shape [H, W, W]; see ``docs/model.md``."""
@@ -206,6 +209,10 @@ class RecognitionModel:
         part._refresh_transitions()
         return part
 
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        vars(self).update(state)
+        protect(state.values())
+
     def learn_from(self, history: History, time: int) -> Revelation | None:
         """Extend every hypothesis by the look at a time of a trial, as ``learn`` does; ``None`` if no aspect is new."""
         return self.learn(*history.step(time))
@@ -238,9 +245,11 @@ class RecognitionModel:
         noise = self.parameters.observation_noise / self.n_patterns
         last = self.n_known[hypotheses] + 1 == self.n_aspects
         shares = np.where(last, 1.0, truth / (truth + noise))
-        self.n_known[hypotheses] += 1
-        states = self.n_known[hypotheses]
+        states = self.n_known[hypotheses] + 1
+        # Tables are replaced, not written to: a copy of this model keeps those that it has.
+        self.n_known, self.aspect_of = self.n_known.copy(), self.aspect_of.copy()
         self.pattern_of = widened(self.pattern_of, int(states.max()) + 1, -1)
+        self.n_known[hypotheses] = states
         self.aspect_of[hypotheses, pattern] = states
         self.pattern_of[hypotheses, states] = pattern
         self._refresh_aspects()
@@ -253,7 +262,8 @@ class RecognitionModel:
         owners = edges.hypothesis[of_action]
         same = (edges.source[of_action] == sources[owners]) & (edges.target[of_action] == targets[owners])
         again = of_action[same]
-        edges.weight[again] += 1.0
+        weight = edges.weight.copy()
+        weight[again] += 1.0
         first_time = (sources != COLLECTION) & (targets != COLLECTION)
         first_time[edges.hypothesis[again]] = False
         hypotheses = np.flatnonzero(first_time)
@@ -264,7 +274,7 @@ class RecognitionModel:
             targets[hypotheses],
             np.ones(len(hypotheses)),
         )
-        self.edges = edges.followed_by(new)
+        self.edges = edges._replace(weight=weight).followed_by(new)
 
 
 def widened(table: NDArray[_Number], width: int, fill: float = 0) -> NDArray[_Number]:

@@ -1,3 +1,4 @@
+import numpy as np
 import pytest
 
 from atg_fg.core.assumptions import Assumptions, arcube_assumptions
@@ -50,3 +51,24 @@ def test_an_unknown_action_is_refused_with_the_names_there_are(name: object) -> 
 def test_equal_assumptions_are_equal() -> None:
     assert arcube_assumptions() == arcube_assumptions()
     assert arcube_assumptions() != arcube_assumptions(99)
+
+
+def test_a_list_of_names_is_as_good_as_a_tuple_and_numpy_numbers_as_plain_ones() -> None:
+    listed = Assumptions(
+        np.int64(5),
+        np.int32(4),
+        ["push", "pull"],
+        PatternAlphabet(["front", "top"], np.int16(3)),  # type: ignore
+    )
+    plain = Assumptions(5, 4, ("push", "pull"), PatternAlphabet(("front", "top"), 3))
+    assert listed == plain
+    assert hash(listed) == hash(plain)
+    assert (type(listed.n_objects), type(listed.alphabet.n_symbols)) == (int, int)
+
+
+@pytest.mark.parametrize("names", ["push", ["push", 3], 7, None, {"push": 1}])
+def test_what_is_no_sequence_of_names_is_refused(names: object) -> None:
+    with pytest.raises(InvalidInputError, match=r"actions: .*expected at least one name, all different"):
+        Assumptions(5, 4, names, ALPHABET)  # type: ignore
+    with pytest.raises(InvalidInputError, match=r"slots: .*expected at least one name, all different"):
+        PatternAlphabet(names, 5)  # type: ignore

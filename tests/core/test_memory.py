@@ -1,3 +1,4 @@
+import numpy as np
 import pytest
 
 from atg_fg.core.errors import InvalidInputError, UnknownNameError
@@ -98,3 +99,29 @@ def test_the_order_of_objects_and_the_assumptions_are_part_of_a_memory() -> None
     assert RobotMemory(WORLD) != RobotMemory(one_slot(4, 3, 6))
     assert memory != "memory"
     assert repr(memory) == "RobotMemory(2 of 3 objects)"
+
+
+@pytest.mark.parametrize(("patterns", "actions"), [([None], []), ([None, None], [0])])
+def test_a_novel_object_that_was_never_seen_whole_is_no_graph(patterns: list, actions: list) -> None:
+    memory = cup_and_mug()
+    with pytest.raises(InvalidInputError, match="learn: no pattern was seen whole"):
+        memory.learn(patterns, actions, None)
+    assert len(memory) == 2
+    assert memory.learn(patterns, actions, memory.names[0]) == memory.names[0]
+
+
+def test_numpy_integers_are_learned_as_plain_ones() -> None:
+    plain, other = cup_and_mug(), cup_and_mug()
+    plain.learn([0, 1, 0], [0, 0], None)
+    other.learn(np.array([0, 1, 0]), np.array([0, 0], dtype=np.uint8), None)
+    assert plain == other
+    assert {type(number) for edge, count in list(other)[-1].counts.items() for number in (*edge, count)} == {int}
+
+
+@pytest.mark.parametrize(("patterns", "actions"), [([0, 99], [0]), ([0, 1], [5]), ([0, 1.5], [0]), ([0, True], [0])])
+def test_what_cannot_be_learned_is_refused_before_anything_is(patterns: list, actions: list) -> None:
+    graph_alone = next(iter(cup_and_mug()))
+    before = graph_alone.copy()
+    with pytest.raises(InvalidInputError, match="expected a whole number from 0"):
+        graph_alone.learn(patterns, actions)
+    assert graph_alone == before

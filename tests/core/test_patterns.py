@@ -116,3 +116,16 @@ def test_soft_evidence_is_a_copy_and_never_complete() -> None:
     mine[:] = 7
     assert evidence.likelihood.tolist() == [0, 0, 0, 1, 0, 0]
     assert evidence.pattern is None
+
+
+@pytest.mark.parametrize("pattern", [999, 6, -1, 1.0, True, "1"])
+def test_evidence_of_a_pattern_that_is_not_there_is_refused(pattern: object) -> None:
+    with pytest.raises(InvalidInputError, match=r"evidence: pattern: .*; expected a whole number from 0 to 5"):
+        Evidence(np.ones(6), pattern).check(6)
+
+
+def test_symbols_and_evidence_cannot_be_written_to() -> None:
+    alphabet = PatternAlphabet(("front", "top"), 3)
+    for array in (alphabet.symbols, Evidence.of_detection(alphabet, (0, 1)).likelihood):
+        with pytest.raises(ValueError, match="read-only"):
+            array[0] = 0

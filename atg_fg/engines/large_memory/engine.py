@@ -7,6 +7,7 @@ from typing import ClassVar, Final, NamedTuple
 import numpy as np
 
 from atg_fg.core.belief import IdentityBelief
+from atg_fg.core.checks import whole_number
 from atg_fg.core.compact.compact_memory import CompactMemory, GraphArrays
 from atg_fg.core.log_math import log_of, log_sum_exp
 from atg_fg.core.memory import RobotMemory
@@ -15,7 +16,6 @@ from atg_fg.engines.large_memory.aspect_filter import AspectFilter
 from atg_fg.engines.large_memory.decision import by_class, entropy_bound, expected_entropies, is_decided, one_by_one
 from atg_fg.engines.large_memory.never_matched import ClassMasses, NeverMatched
 from atg_fg.engines.large_memory.tables_on_demand import TablesOnDemand
-from atg_fg.engines.options import whole_number
 from atg_fg.inference.chain import build_chain, forward_backward
 from atg_fg.inference.interface import Inference, TrialSetup
 
@@ -65,7 +65,7 @@ class LargeMemory(Inference):
         n_exact: int = 100,
     ) -> None:
         super().__init__(setup)
-        few = len(self.memory) <= whole_number("n_exact", n_exact, 0)
+        few = len(self.memory) <= whole_number(n_exact, "n_exact", 0)
         of_objects = self.model.prior[:-1]
         self._compact = CompactMemory.of(self.memory)
         self._log_total = 0.0

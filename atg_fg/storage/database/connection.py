@@ -47,6 +47,12 @@ def translated(place: Path | str) -> Iterator[None]:
     """
     try:
         yield
+    except sqlite3.ProgrammingError as error:
+        if "thread" not in str(error):
+            raise
+        raise InvalidInputError(
+            f"{place}: used from another thread than the one that opened it; expected each thread to open it itself"
+        ) from error
     except sqlite3.Error as error:
         code = getattr(error, "sqlite_errorcode", 0) & 0xFF
         if code in (sqlite3.SQLITE_BUSY, sqlite3.SQLITE_LOCKED):

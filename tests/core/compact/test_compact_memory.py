@@ -35,6 +35,8 @@ def test_it_learns_what_any_memory_learns_and_keeps_its_index_up(trials: list) -
     plain, compact = RobotMemory(ARCUBES), CompactMemory(ARCUBES)
     for patterns, actions, choice in trials:
         matched = plain.names[choice] if choice < len(plain) else None
+        if matched is None and patterns == [None] * 4:
+            continue  # refused
         assert plain.learn(patterns, actions, matched) == compact.learn(patterns, actions, matched)
     assert list(compact) == list(plain)
     assert (compact.names, len(compact), compact.n_unseen) == (plain.names, len(plain), plain.n_unseen)

@@ -1,5 +1,8 @@
+import copy
 import json
+import pickle
 import sqlite3
+from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
@@ -248,3 +251,24 @@ def test_what_sqlite_cannot_hold_is_refused_and_nothing_is_written(path):
         memory_files.save_memory(memory, path)
     with pytest.raises(InvalidInputError, match="holds no memory"):
         memory_files.load_memory(path)
+
+
+def test_a_memory_that_another_thread_uses_is_refused_by_that_name(path):
+    with open_memory(path, ARCUBES) as memory:
+        add_cube(memory, 0)
+        with ThreadPoolExecutor(1) as pool:
+            for use in (lambda: add_cube(memory, 1), memory.refresh, lambda: list(memory.trials())):
+                with pytest.raises(InvalidInputError, match="used from another thread than the one that opened it"):
+                    pool.submit(use).result()
+        add_cube(memory, 1)
+        assert memory_files.load_memory(path) == memory
+
+
+def test_a_copy_of_a_memory_is_in_no_file(path):
+    with open_memory(path, ARCUBES) as memory:
+        add_cube(memory, 0)
+        for copied in (copy.deepcopy(memory), pickle.loads(pickle.dumps(memory))):
+            assert copied == memory
+            assert not copied.is_kept
+            add_cube(copied, 1)
+        assert len(memory_files.load_memory(path)) == len(memory) == 1
