@@ -105,7 +105,7 @@ class AspectTransitionGraph:
         """Count ``count`` more observations of a transition between known aspects.
 
         Raises:
-            InvalidInputError: An aspect or action that is not there, or a count below one.
+            InvalidInputError: An aspect or action that is not there, a count below one, or a sum above 2^53.
         """
         for role, aspect in (("source", source), ("target", target)):
             if not self.n_known:
@@ -114,9 +114,11 @@ class AspectTransitionGraph:
                 )
             whole_number(aspect, f"{self.name}: {role} aspect", 0, self.n_known - 1)
         self._check_action(action)
-        whole_number(count, f"{self.name}: count", 1, MAX_NUMBER)
         edge = (int(source), int(action), int(target))
-        self._counts[edge] = self._counts.get(edge, 0) + int(count)
+        total = self._counts.get(edge, 0) + whole_number(count, f"{self.name}: count", 1, MAX_NUMBER)
+        if total > MAX_NUMBER:  # not exact as a floating-point number, and refused by whoever reads a file with it
+            raise InvalidInputError(f"{self.name}: count {total}; expected a sum of at most 2^53")
+        self._counts[edge] = total
         self._count_table = None
 
     def _check_action(self, action: int) -> None:

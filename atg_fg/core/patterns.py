@@ -16,7 +16,7 @@ from typing import Any, Final, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from atg_fg.core.checks import distinct_names, whole_number
+from atg_fg.core.checks import brief, distinct_names, whole_number
 from atg_fg.core.errors import InvalidInputError
 
 FloatArray: TypeAlias = NDArray[np.float64]
@@ -125,7 +125,7 @@ class PatternAlphabet:
         """Return ``detection`` as a tuple, or raise ``InvalidInputError`` naming ``place``."""
         if isinstance(detection, str) or not hasattr(detection, "__len__") or len(detection) != len(self.slots):
             raise InvalidInputError(
-                f"{place}: {detection!r}; expected one entry for each of {len(self.slots)} slots: "
+                f"{place}: {brief(detection)}; expected one entry for each of {len(self.slots)} slots: "
                 f"{', '.join(self.slots)}"
             )
         symbols: list[int | None] = []
@@ -134,7 +134,7 @@ class PatternAlphabet:
                 symbols.append(None)
                 continue
             if isinstance(symbol, (bool, np.bool_)) or not isinstance(symbol, (int, np.integer)):
-                raise InvalidInputError(f"{place}, slot {slot!r}: {symbol!r}; expected a whole number or null")
+                raise InvalidInputError(f"{place}, slot {slot!r}: {brief(symbol)}; expected a whole number or null")
             if not 0 <= symbol < self.n_symbols:
                 raise InvalidInputError(f"{place}, slot {slot!r}: symbol {symbol}; expected 0 to {self.n_symbols - 1}")
             if int(symbol) in symbols:

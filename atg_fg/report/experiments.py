@@ -5,13 +5,17 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Final, TypeAlias
 
+from atg_fg.core.checks import number, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.statistics import wilson_interval
 from atg_fg.report.content import Plot, Point, Report, Series, Table, shown_parameters
+from atg_fg.storage.checked_json import read_info
 
 _Views: TypeAlias = tuple[list[Table], list[Plot]]
 
 _SUCCESS: Final = "success, %"
+#: That a plot has room for.
+_MOST_ACTIONS: Final = 10**6
 _ACTIONS: Final = "actions a trial"
 
 
@@ -28,11 +32,17 @@ def read_experiment(document: Mapping[str, Any], place: str) -> Report:
     command = str(document["command"])
     title, make = EXPERIMENTS[command]
     try:
+        read_info(document, place)
         tables, plots = make(document)
         parameters = shown_parameters(document.get("parameters", {}))
     except (KeyError, IndexError, TypeError, ValueError, AttributeError, ZeroDivisionError, OverflowError) as error:
+        if isinstance(error, InvalidInputError) and str(error).startswith(place):
+            raise
         raise InvalidInputError(f"{place}: {error!r}; expected a result that atg-fg {command} --json wrote") from error
-    return Report(title, parameters, tables=tuple(tables), plots=tuple(plots))
+    if not any(table.rows for table in tables):
+        raise InvalidInputError(f"{place}: no results; expected at least one")
+    drawn = [plot for plot in plots if any(series.points for series in plot.series)]
+    return Report(title, parameters, tables=tuple(tables), plots=tuple(drawn))
 
 
 def _table1(document: Mapping[str, Any]) -> _Views:
@@ -90,7 +100,7 @@ def _curves(title: str, points: Sequence[Mapping[str, Any]], kind: str) -> tuple
     """Return success over the number of actions, one curve and one column a ``kind``."""
     names = list(dict.fromkeys(str(point[kind]) for point in points))
     found = {(point["actions"], str(point[kind])): point for point in points}
-    numbers = sorted({point["actions"] for point in points})
+    numbers = sorted({whole_number(point["actions"], "actions", 1, _MOST_ACTIONS) for point in points})
     rows = [
         (str(number), *(_rate_at(found.get((number, name))) for name in names)) for number in numbers
     ]  # fmt: skip
@@ -240,26 +250,33 @@ def _of(count: int, total: int) -> tuple[float, tuple[float, float]]:
 def _scaled(rate: tuple[float, Sequence[float]]) -> tuple[float, float, float]:
     """Return a rate and the bounds of its interval in per cent."""
     value, (low, high) = rate
-    return 100 * value, 100 * low, 100 * high
+    return _share(value), _share(low), _share(high)
+
+
+def _share(rate: float) -> float:
+    """Return a rate in per cent, or raise ``InvalidInputError`` if it is none."""
+    return 100 * number(rate, "rate", 0.0, 1.0, slack=1e-9)
 
 
 def _percent(rate: float | None) -> str:
-    return "–" if rate is None else f"{100 * rate:.1f} %"
+    return "–" if rate is None else f"{_share(rate):.1f} %"
 
 
-def _interval(bounds: Sequence[float]) -> str:
+def _interval(bounds: Sequence[float] | None) -> str:
+    if bounds is None:
+        return "–"
     low, high = bounds
-    return f"{100 * low:.1f}–{100 * high:.1f} %"
+    return f"{_share(low):.1f}–{_share(high):.1f} %"
 
 
 def _rate(rate: float, bounds: Sequence[float]) -> str:
     low, high = bounds
-    return f"{100 * rate:.1f} ({100 * low:.1f}–{100 * high:.1f})"
+    return f"{_share(rate):.1f} ({_share(low):.1f}–{_share(high):.1f})"
 
 
 def _count(counts: Sequence[int]) -> str:
     right, total = counts
-    return f"{right} of {total}"
+    return f"{whole_number(right, 'count', 0, whole_number(total, 'count'))} of {total}"
 
 
 def _number(value: float | None) -> str:

@@ -28,7 +28,10 @@ def data_address(name: object, folder: Path, place: str) -> str:
         raise InvalidInputError(f"{place}: {name!r}; expected the path of a picture")
     path = PurePosixPath(name)
     # A record from elsewhere must not put other files of this computer into a page.
-    inside = (folder / path).resolve().is_relative_to(folder.resolve())
+    try:
+        inside = (folder / path).resolve().is_relative_to(folder.resolve())
+    except (OSError, RuntimeError):  # links that lead in a circle
+        inside = False
     if path.is_absolute() or not inside:
         raise InvalidInputError(f"{place}: {name!r}; expected a path inside the record's folder")
     if not is_plain_file(folder / path):

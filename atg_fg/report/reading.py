@@ -7,6 +7,7 @@ import zlib
 from pathlib import Path
 from typing import Any, Final
 
+from atg_fg.core.checks import brief
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.report.content import Report
@@ -86,5 +87,5 @@ def _first_line(text: str) -> dict[str, Any]:
 
 def _what_it_says(document: Any) -> str:
     if isinstance(document, dict) and ("command" in document or "format" in document):
-        return f"is of {document.get('command', document.get('format'))!r}"
+        return f"is of {brief(document.get('command', document.get('format')))}"
     return "says neither a command nor a format"

@@ -130,6 +130,9 @@ def summary_of(
     matched, lost_truth, learned = map(fields.get, ("matched", "lost_truth", "learned"))
     if not steps:
         raise InvalidInputError(f"{place}: no looks; expected at least one")
+    still = next((time for time, step in enumerate(steps[:-1]) if step.action is None), None)
+    if still is not None:
+        raise InvalidInputError(f"{place}: look {still}: no action; expected one before the next look")
     if (verdict == "known") != (matched is not None):
         raise InvalidInputError(
             f"{place}: verdict {verdict}, matched {matched!r:.60}; expected a match of what is known only"

@@ -2,6 +2,8 @@ import pytest
 
 from atg_fg.core.aspect_graph import COLLECTION_NODE, AspectTransitionGraph
 from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.memory import RobotMemory
+from atg_fg.storage.memory_json import memory_from_json, memory_to_json
 from tests.small import graph, one_slot
 
 WORLD = one_slot(5, 3, 6, actions=("push", "pull"))
@@ -73,6 +75,25 @@ def test_a_transition_that_cannot_be_is_refused(edge: tuple) -> None:
     with pytest.raises(InvalidInputError, match="cup"):
         cup.add_transition(*edge)
     assert cup.counts == {}
+
+
+def test_no_way_to_learn_takes_a_count_past_what_a_file_can_hold() -> None:
+    full = empty()
+    full.add_aspect((1,))
+    full.add_transition(0, 1, 0, count=2**53)
+    again = full.copy()
+    for learn in (
+        lambda: full.add_transition(0, 1, 0),
+        lambda: full.learn([full.pattern_indices[0]] * 2, [1]),
+        lambda: full.absorb(again),
+    ):
+        with pytest.raises(InvalidInputError, match="expected a sum of at most"):
+            learn()
+    assert full.counts == {(0, 1, 0): 2**53}
+    memory = RobotMemory(full.assumptions, [full])
+    with pytest.raises(InvalidInputError, match="expected a sum"):
+        memory.learn([full.pattern_indices[0]] * 2, [1], matched=full.name)
+    assert memory_from_json(memory_to_json(memory)) == memory
 
 
 def test_a_trial_teaches_new_aspects_and_the_transitions_between_complete_looks() -> None:

@@ -5,7 +5,7 @@ const CHART = { width: 640, height: 240, left: 46, right: 14, top: 12, bottom: 3
 
 function entropyScale(trial) {
   const values = trial.looks.flatMap((look) => [look.entropy, ...look.expected.map(([, value]) => value)]);
-  const top = Math.max(...values, 0.1) * 1.06;
+  const top = values.reduce((most, value) => Math.max(most, value), 0.1) * 1.06;
   const last = Math.max(trial.looks.length - 1, 1);
   return {
     top,
@@ -34,9 +34,13 @@ function entropyAxes(trial, scale) {
   return lines;
 }
 
+// Of a long trial not every look is drawn, but the one that is shown, always.
+const DRAWN = 400;
+const isDrawn = (trial, time, now) => time === now || time % Math.ceil(trial.looks.length / DRAWN) === 0;
+
 // The expectation of an action stands at the look that follows it; the chosen one is filled.
-function promises(data, trial, scale) {
-  return trial.looks.flatMap((look, time) => look.expected.map(([action, value]) => {
+function promises(data, trial, scale, now) {
+  return trial.looks.flatMap((look, time) => !isDrawn(trial, time, now) ? [] : look.expected.map(([action, value]) => {
     const color = data.actions.indexOf(action);
     const x = scale.x(Math.min(time + 1, Math.max(trial.looks.length - 1, 1))) + 7 * (color - (data.actions.length - 1) / 2);
     const kind = action === look.action ? "promise chosen" : "promise";
@@ -48,11 +52,12 @@ function promises(data, trial, scale) {
 function drawnEntropy(data, trial, now) {
   const scale = entropyScale(trial);
   const points = trial.looks.map((look, time) => [scale.x(time), scale.y(look.entropy)]);
-  const dots = points.map(([cx, cy], time) => shape("circle",
+  const dots = points.map(([cx, cy], time) => !isDrawn(trial, time, now) ? null : shape("circle",
     { class: time === now ? "h-dot now" : "h-dot", cx, cy, r: time === now ? 6.5 : 3.2 }));
   const cursor = { class: "cursor", x1: points[now][0], x2: points[now][0], y1: CHART.top, y2: CHART.height - CHART.bottom };
-  const words = `Entropy of identity: ${trial.looks.map((look) => look.entropy.toFixed(2)).join(", ")} nats`;
+  const told = trial.looks.filter((_, time) => isDrawn(trial, time, now)).map((look) => look.entropy.toFixed(2));
+  const words = `Entropy of identity: ${told.join(", ")} nats`;
   return shape("svg", { viewBox: `0 0 ${CHART.width} ${CHART.height}`, role: "img", "aria-label": words },
     ...entropyAxes(trial, scale), shape("line", cursor), shape("path", { class: "h-line", d: `M${points.join(" L")}` }),
-    ...promises(data, trial, scale), ...dots);
+    promises(data, trial, scale, now), dots);
 }
