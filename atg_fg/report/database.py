@@ -17,7 +17,8 @@ from atg_fg.report.test_log import test_report
 from atg_fg.storage.database.memory_reading import database_holds_memory
 from atg_fg.storage.database.trial_log import TEST_KIND, read_stored_experiments, read_stored_trials
 from atg_fg.storage.memory_files import load_memory
-from atg_fg.storage.recorded_test import stored_test
+from atg_fg.storage.recorded_test import read_header, stored_test
+from atg_fg.worlds.registry import WORLDS
 
 _NOTE: Final = (
     "A database keeps no belief over single objects: what is shown of it is the probability that the object was never "
@@ -66,10 +67,19 @@ def _experiment_report(experiment: Experiment | None, memory: RobotMemory | None
         test = stored_test(path, experiment, stated)
         return test_report(test) if test.trials else None
     assumptions = stated or arcube_assumptions()
-    number = None if experiment is None else experiment.number
-    trials = [trial for trial in read_stored_trials(path, number, assumptions) if trial.experiment == number]
+    if experiment is None:
+        trials = list(read_stored_trials(path, assumptions=assumptions, alone=True))
+    else:
+        # The memory that is there now may be of another world than the one that the trials were run in.
+        if experiment.parameters.get("world") in list(WORLDS):
+            assumptions = (
+                read_header(experiment.parameters, f"{path}: experiment {experiment.number}")[1] or assumptions
+            )
+        trials = list(read_stored_trials(path, experiment.number, assumptions))
     if not trials:
         return None
+    if memory is not None and replace(assumptions, n_objects=memory.assumptions.n_objects) != memory.assumptions:
+        memory = None
     pages = [_page(trial, memory, assumptions) for trial in trials]
     kind = "trial" if experiment is None else experiment.kind
     parameters = {} if experiment is None else {"seed": experiment.seed, **experiment.parameters}

@@ -37,7 +37,7 @@ def plan_of(world, name, engine):
     return TestPlan(world=world, engine=engine, parameters=preset(name), n_trials=N_TRIALS, n_actions=2, n_objects=100)
 
 
-@pytest.mark.parametrize(("world", "name", "engine"), cases())
+@pytest.mark.parametrize(("world", "name", "engine"), list(cases()))
 def test_a_test_in_a_log_and_in_a_database(world, name, engine, run, tmp_path):
     plan = plan_of(world, name, engine)
     log, kept = tmp_path / "test-0000.jsonl.gz", tmp_path / "kept.db"
@@ -61,7 +61,7 @@ def test_a_test_in_a_log_and_in_a_database(world, name, engine, run, tmp_path):
         assert run_test(longer, 0, file, resume=True) == result
 
 
-@pytest.mark.parametrize(("world", "name", "engine"), cases())
+@pytest.mark.parametrize(("world", "name", "engine"), list(cases()))
 def test_a_trial_in_a_record_and_in_a_database(world, name, engine, run, tmp_path):
     robot, record = tmp_path / "robot.db", tmp_path / "trial.jsonl"
     about = ("--world", world, "--preset", name, "--engine", engine, "--actions", "2")

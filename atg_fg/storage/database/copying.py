@@ -33,7 +33,7 @@ def records_in(
     for experiment in read_stored_experiments(path):
         trials = read_stored_trials(path, experiment.number)
         yield replace(experiment, number=0), [_renamed(trial, renamed or {}) for trial in trials]
-    alone = [_renamed(trial, renamed or {}) for trial in read_stored_trials(path) if trial.experiment is None]
+    alone = [_renamed(trial, renamed or {}) for trial in read_stored_trials(path, alone=True)]
     if alone:
         yield None, alone
 

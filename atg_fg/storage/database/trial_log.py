@@ -98,7 +98,7 @@ def _already_there(path: Path) -> InvalidInputError:
 
 
 def read_stored_trials(
-    path: Path | str, experiment: int | None = None, assumptions: Assumptions | None = None
+    path: Path | str, experiment: int | None = None, assumptions: Assumptions | None = None, *, alone: bool = False
 ) -> Iterator[TrialSummary]:
     """Yield the trials in a database, all or those of one experiment.
 
@@ -106,12 +106,13 @@ def read_stored_trials(
         path: The database.
         experiment: Number of the experiment; all if not given.
         assumptions: Of the trials, as for ``trial_log.from_line``.
+        alone: Whether only those are asked for that belong to no experiment.
 
     Raises:
         InvalidInputError: The file cannot be read, or a trial in it is not as it should be.
     """
     with reading(path) as connection:
-        yield from trial_rows.read_trials(connection, str(path), experiment, assumptions)
+        yield from trial_rows.read_trials(connection, str(path), experiment, assumptions, alone=alone)
 
 
 def read_stored_experiments(path: Path | str) -> list[Experiment]:

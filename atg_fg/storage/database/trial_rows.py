@@ -119,6 +119,8 @@ def read_trials(
     place: str,
     experiment: int | None = None,
     assumptions: Assumptions | None = None,
+    *,
+    alone: bool = False,
 ) -> Iterator[TrialSummary]:
     """Yield trials in the order in which they were written, a few in RAM at a time.
 
@@ -127,11 +129,12 @@ def read_trials(
         place: For error messages.
         experiment: Number of the experiment whose trials they are; all trials if not given.
         assumptions: Of the trials, as for ``trial_log.from_line``.
+        alone: Whether only those are asked for that belong to no experiment.
 
     Raises:
         InvalidInputError: One that is not as it should be.
     """
-    for key in _keys(connection, place, experiment):
+    for key in _keys(connection, place, experiment, alone=alone):
         yield _trial(connection, key, f"{place}: trial {key!r}", assumptions)
 
 
@@ -145,7 +148,7 @@ def trials_or_faults(
         place: For error messages.
         assumptions: Of the trials of each experiment, where they are known.
     """
-    for key in _keys(connection, place, None):
+    for key in _keys(connection, place):
         (experiment,) = connection.execute("SELECT experiment FROM trials WHERE id = ?", (key,)).fetchone()
         try:
             yield key, _trial(connection, key, f"{place}: trial {key!r}", assumptions.get(experiment))
@@ -153,12 +156,14 @@ def trials_or_faults(
             yield key, error
 
 
-def _keys(connection: sqlite3.Connection, place: str, experiment: int | None) -> Iterator[int]:
-    last = 0
+def _keys(
+    connection: sqlite3.Connection, place: str, experiment: int | None = None, *, alone: bool = False
+) -> Iterator[int]:
+    last, all_of_them = 0, experiment is None and not alone
     while True:
         page = connection.execute(
-            "SELECT id FROM trials WHERE id > ? AND (? OR experiment = ?) ORDER BY id LIMIT ?",
-            (last, experiment is None, experiment, _PAGE),
+            "SELECT id FROM trials WHERE id > ? AND (? OR experiment IS ?) ORDER BY id LIMIT ?",
+            (last, all_of_them, experiment, _PAGE),
         ).fetchall()
         yield from (key for (key,) in page)
         if len(page) < _PAGE:
