@@ -67,18 +67,8 @@ def plain_text(value: Any, place: str) -> str:
     return value
 
 
-def names(value: Any, place: str) -> tuple[str, ...]:
-    """Return ``value`` as a tuple, or raise ``InvalidInputError`` unless it is a list of texts, all different."""
-    if not isinstance(value, (list, tuple)):
-        raise InvalidInputError(f"{place}: {brief(value)}; expected a list of names")
-    found = tuple(plain_text(name, f"{place}[{index}]") for index, name in enumerate(value))
-    if len(set(found)) < len(found):
-        raise InvalidInputError(f"{place}: {brief(value)}; expected names that are all different")
-    return found
-
-
 def brief(value: Any) -> str:
-    """Return what a value is, in at most 60 characters of ASCII if it has half characters."""
+    """Return what a value is, in at most 60 characters."""
     try:
         told = repr(value)
     except (ValueError, RecursionError):  # a number of thousands of digits, or lists in lists without end

@@ -45,7 +45,9 @@ def read_trial_record(text: str, path: Path, memory: RobotMemory | None) -> Repo
     first = f"{path}: line 1"
     check_format(_holding(header, first, "format", "version", "objects"), TRIAL_FORMAT, first)
     read_info(header, first)
-    names = list(checks.names(header["objects"], f"{first}: objects"))
+    names = read_list(header["objects"], f"{first}: objects")
+    if names:  # a memory may be empty
+        checks.distinct_names(names, f"{first}: objects")
     assumptions = _assumptions(header, memory, path)
     # A memory that was saved after the trial may have one object more.
     if memory is not None and list(memory.names)[: len(names)] != names:

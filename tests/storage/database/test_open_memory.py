@@ -6,6 +6,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 
+from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.errors import BusyMemoryError, InvalidInputError, UnknownNameError
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.experiments.trial import learn_from
@@ -244,9 +245,7 @@ def test_other_assumptions_are_refused(path):
 
 def test_what_sqlite_cannot_hold_is_refused_and_nothing_is_written(path):
     memory = plain(1)
-    graph = memory["object-000"]
-    for _ in range(2**10 + 1):
-        graph.add_transition(0, 0, 0, 2**53)
+    memory.add(AspectTransitionGraph("half a character: \ud800", memory.assumptions))
     with pytest.raises(InvalidInputError, match="cannot be held in a database"):
         memory_files.save_memory(memory, path)
     with pytest.raises(InvalidInputError, match="holds no memory"):
