@@ -112,6 +112,32 @@ def picture(
     say(f"saved: {', '.join(str(file) for file in (output, film, table) if file is not None)}")
 
 
+@app.command()
+def webcam(
+    tags: Annotated[Path, typer.Option(help="Tags of the cubes, as print cube wrote them (JSON).")],
+    output: Annotated[Path, typer.Option("--output", "-o", writable=True, help="Video to write, .avi or .mp4.")],
+    calibration: Annotated[
+        Path, typer.Option(writable=True, help="File for the calibration of the webcam, which live takes.")
+    ] = Path("webcam.json"),
+    trials: Annotated[int, typer.Option(min=1, help="Cubes put down, each once before any comes again.")] = 3,
+    actions: Annotated[
+        int, typer.Option(min=0, help="Turns of each, at random, to views not shown before where there are such.")
+    ] = 5,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of cubes, turns, noise, and how straight cubes stand.")] = 0,
+) -> None:
+    """Film cubes that are turned by hand before a webcam, to try live where there is no camera.
+
+    Example: atg-fg sim webcam --tags cubes.json -o turns.avi
+    """
+    plain_files.check_writable(output)
+    plain_files.check_writable(calibration)
+    from sim.vision.random_film import film_cubes
+
+    for number, (cube, turns) in enumerate(film_cubes(tags, output, calibration, trials, actions, seed)):
+        say(f"trial {number}: cube {cube + 1}, turned {', '.join(turns) or 'not at all'}")
+    say(f"saved: {output}, {calibration}")
+
+
 def _run(
     condition: str, actions: int, stations: int, seed: int, urdf: Path | None, jobs: int | None, json_file: str | None
 ) -> list[Any]:

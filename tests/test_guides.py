@@ -111,3 +111,51 @@ def test_an_agent_of_stable_baselines3_is_trained_and_scored(tmp_path, monkeypat
     module, command = blocks("agents.md", "sh")[0].splitlines()
     (tmp_path / "my_agent.py").write_text(module.split("'")[1].replace("\\n", "\n"))
     on_the_command_line(command.removeprefix("PYTHONPATH=. "), tmp_path, "--tests", "1", "--trials", "3", "--jobs", "1")
+
+
+@pytest.fixture
+def webcam_guide(tmp_path):
+    """Run the commands of the guide to webcams, shorter ones if a function is given; return their output."""
+    for needed in ("cv2", "pybullet", "matplotlib"):
+        pytest.importorskip(needed)
+    folder = tmp_path
+
+    def run_commands(shortened=lambda words: words):
+        printed = []
+        for block in blocks("with_a_webcam.md", "sh"):
+            for command in block.splitlines():
+                program, *words = shortened(shlex.split(command))
+                done = subprocess.run(
+                    [Path(sys.executable).with_name(program), *words],
+                    cwd=folder,
+                    capture_output=True,
+                    text=True,
+                    check=False,
+                )
+                assert done.returncode == 0, f"{command}: {done.stderr}"
+                printed.append(done.stdout)
+        return printed, folder
+
+    return run_commands
+
+
+def test_the_guide_to_webcams_runs_as_it_is_printed_with_shorter_films(webcam_guide, monkeypatch, capsys):
+    def shortened(words):
+        return [*words, "--trials", "1", "--actions", "1"] if words[1] == "sim" else words
+
+    (sheets, *_, learned, recognised), folder = webcam_guide(shortened)
+    assert "told apart after 0.00 actions on average" in sheets
+    assert "learned: object-000" in learned
+    assert "memory: robot.db, 1 objects" in recognised
+    monkeypatch.chdir(folder)
+    (code,) = blocks("with_a_webcam.md")
+    run(code, "with_a_webcam.md", {})
+    assert capsys.readouterr().out.startswith("{'front': (")
+
+
+@pytest.mark.slow
+def test_the_guide_to_webcams_comes_to_the_verdicts_that_it_tells(webcam_guide):
+    (*_, learned, recognised), _ = webcam_guide()
+    assert re.findall(r"learned: (\S+)", learned) == ["object-000", "object-001", "object-002"]
+    told = re.search(r"after two turns each: `(\S+)`, `(\S+)`, `(\S+)`", (DOCS / "with_a_webcam.md").read_text())
+    assert re.findall(r"verdict: (\S+)", recognised) == list(told.groups())

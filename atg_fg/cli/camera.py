@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     import numpy as np
     from numpy.typing import NDArray
 
-app = typer.Typer(help="Cameras: calibration. Example: atg-fg camera calibrate pictures/*.jpg", no_args_is_help=True)
+app = typer.Typer(help="Cameras: calibration. Example: atg-fg camera calibrate --video board.mp4", no_args_is_help=True)
 
 Columns = Annotated[int, typer.Option(help="Squares of the board across.")]
 Rows = Annotated[int, typer.Option(help="Squares of the board down.")]
@@ -51,7 +51,7 @@ def calibrate(
 ) -> None:
     """Measure a camera and its lens from pictures of a board (OpenCV's ChArUco), such as print board makes.
 
-    Example: atg-fg camera calibrate pictures/*.jpg -o camera.json
+    Example: atg-fg camera calibrate board-1.jpg board-2.jpg board-3.jpg board-4.jpg board-5.jpg -o camera.json
     """
     options.check_json_option(json_file)
     plain_files.check_writable(output)

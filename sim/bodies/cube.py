@@ -41,19 +41,17 @@ FACE_UPS: Final[FloatArray] = np.array([[0, 0, 1]] * 4 + [[1, 0, 0], [-1, 0, 0]]
 _TAG_PIXELS = 84  # 12 for each of the 7 cells of a 5×5 tag with its border
 
 
-_FACE_PIXELS = 112  # the face is 4/3 of the tag
-
-
 def tag_image(symbol: int, pixels: int = _TAG_PIXELS) -> NDArray[np.uint8]:
     """Return the ArUco tag of a symbol in grey levels, shape [pixels, pixels]."""
     return tags.tag_image(TAG_DICTIONARY, symbol, pixels)
 
 
-def face_image(symbol: int) -> NDArray[np.uint8]:
-    """Return a white face with a symbol's tag in the middle, RGB, shape [112, 112, 3]."""
-    face = np.full((_FACE_PIXELS, _FACE_PIXELS, 3), 255, dtype=np.uint8)
-    margin = (_FACE_PIXELS - _TAG_PIXELS) // 2
-    face[margin:-margin, margin:-margin] = tag_image(symbol)[:, :, None]
+def face_image(symbol: int, dictionary: str = TAG_DICTIONARY) -> NDArray[np.uint8]:
+    """Return a white face with a tag in the middle, RGB, 4/3 of the tag: shape [112, 112, 3] for a 5×5 tag."""
+    pixels = 12 * len(tags.tag_cells(dictionary, symbol))
+    margin = pixels // 6
+    face = np.full((pixels + 2 * margin, pixels + 2 * margin, 3), 255, dtype=np.uint8)
+    face[margin:-margin, margin:-margin] = tags.tag_image(dictionary, symbol, pixels)[:, :, None]
     return face
 
 

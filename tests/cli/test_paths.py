@@ -43,6 +43,7 @@ OUTPUTS = {
     "sim calibrate": {"json_file", "output"},
     "sim picture": {"output", "film", "table"},
     "sim reliability": {"json_file"},
+    "sim webcam": {"output", "calibration"},
     "table1": {"json_file", "records", "save_memories"},
     "trial": {"json_file", "record", "save_memory"},
     "uai export": {"model", "evidence"},
