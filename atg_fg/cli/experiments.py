@@ -37,6 +37,7 @@ def table1(
     actions: options.Actions = 10,
     settled: options.Settled = None,
     trials: options.Trials = 100,
+    objects: Annotated[int, typer.Option(help="Objects that there are in the world.")] = 100,
     seed: options.Seed = 0,
     slip: options.Slip = 0.0,
     wrong: options.Wrong = 0.0,
@@ -114,6 +115,7 @@ def table1(
         merge_duplicates=merge_duplicates,
         n_actions=actions,
         n_trials=trials,
+        n_objects=objects,
         settled=settled,
     )
     with options.progress_bar("tests", tests) as advance:
@@ -130,6 +132,7 @@ def table1(
         "tests": tests,
         "actions": actions,
         "trials": trials,
+        **({} if objects == TestPlan.n_objects else {"objects": objects}),
         "seed": seed,
         "slip": slip,
         "wrong": wrong,

@@ -9,7 +9,7 @@ from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.merging import Merge, check_merges
-from atg_fg.core.patterns import Detection
+from atg_fg.core.patterns import Confidences, Detection
 from atg_fg.core.table import Bar, Cell, Table
 from atg_fg.core.transactions import Persistent, one_transaction
 
@@ -83,14 +83,24 @@ class RobotMemory(Persistent):
         self._graphs[graph.name] = graph
         return graph.name
 
-    def learn_shared(self, name: str, detections: Sequence[Detection], actions: Sequence[int]) -> None:
+    def learn_shared(
+        self,
+        name: str,
+        detections: Sequence[Detection],
+        actions: Sequence[int],
+        confidences: Sequence[Confidences] = (),
+    ) -> str:
         """Learn from a raw trial what all objects share: nothing, in a memory that takes each object by itself.
+
+        Returns the name of the ATG that the trial is of from now on.
 
         Args:
             name: Name of the ATG that the trial went to.
             detections: The symbol in each slot at each look, ``None`` where nothing was seen, length t + 1.
             actions: Index of the action between each two, length t.
+            confidences: How sure the detector was of each symbol at each look; none if it never says.
         """
+        return name
 
     def _new_name(self) -> str:
         number = len(self)

@@ -1,7 +1,7 @@
 """Patterns an aspect can show, and evidence about them.
 
-A pattern has one symbol in each *slot* (for an ARcube: the tag in front and the tag on top), all
-different. Evidence is a likelihood over the whole pattern alphabet 𝒵: complete, partial, none or soft.
+A pattern has one symbol in each *slot* (for an ARcube: the tag in front and the tag on top), all different unless the
+alphabet says otherwise. Evidence is a likelihood over the whole pattern alphabet 𝒵: complete, partial, none or soft.
 """
 
 from __future__ import annotations
@@ -29,6 +29,8 @@ Pattern: TypeAlias = tuple[int, ...]
 
 
 Detection: TypeAlias = tuple[int | None, ...]
+#: How sure a detector says it is of each slot's symbol, on a scale of its own; ``None`` where it does not say.
+Confidences: TypeAlias = tuple[float | None, ...]
 
 
 Array = TypeVar("Array", bound=NDArray[Any])
@@ -58,30 +60,35 @@ def protect(values: Iterable[Any]) -> None:
 
 @dataclass(frozen=True)
 class PatternAlphabet:
-    """All ordered tuples of distinct symbols, one symbol a slot, in lexicographic order.
+    """All ordered tuples of symbols, one symbol a slot, in lexicographic order.
 
     Attributes:
         slots: Names of the slots, all different.
         n_symbols: Number of symbols; they are numbered from 0.
+        exclusive: Whether a symbol is in one slot only, as a tag on a cube is; if not, patterns may repeat it.
 
     Raises:
-        InvalidInputError: No slots, repeated slots, fewer symbols than slots, or over
+        InvalidInputError: No slots, repeated slots, fewer symbols than slots that exclude each other, or over
             ``MAX_PATTERNS`` patterns.
     """
 
     slots: tuple[str, ...]
     n_symbols: int
+    exclusive: bool = True
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "slots", distinct_names(self.slots, "slots"))
         object.__setattr__(self, "n_symbols", whole_number(self.n_symbols, "n_symbols"))
-        if self.n_symbols < len(self.slots):
+        if not isinstance(self.exclusive, bool):
+            raise InvalidInputError(f"exclusive: {self.exclusive!r}; expected true or false")
+        least = len(self.slots) if self.exclusive else 1
+        if self.n_symbols < least:
             raise InvalidInputError(
-                f"n_symbols: {self.n_symbols}; expected at least one symbol for each of {len(self.slots)} slots"
+                f"n_symbols: {self.n_symbols}; expected at least one symbol for each of {least} slots"
             )
         n_patterns = 1
         for slot in range(len(self.slots)):
-            n_patterns *= self.n_symbols - slot
+            n_patterns *= self.n_symbols - slot if self.exclusive else self.n_symbols
             if n_patterns > MAX_PATTERNS:
                 raise InvalidInputError(
                     f"n_symbols: {self.n_symbols} symbols in {len(self.slots)} slots make too many patterns; "
@@ -90,12 +97,16 @@ class PatternAlphabet:
 
     def __len__(self) -> int:
         """|𝒵|, the number of patterns."""
-        return math.perm(self.n_symbols, len(self.slots))
+        if self.exclusive:
+            return math.perm(self.n_symbols, len(self.slots))
+        return int(self.n_symbols ** len(self.slots))
 
     @cached_property
     def patterns(self) -> tuple[Pattern, ...]:
         """Every pattern, in the order of its index."""
-        return tuple(itertools.permutations(range(self.n_symbols), len(self.slots)))
+        if self.exclusive:
+            return tuple(itertools.permutations(range(self.n_symbols), len(self.slots)))
+        return tuple(itertools.product(range(self.n_symbols), repeat=len(self.slots)))
 
     @cached_property
     def symbols(self) -> IntArray:
@@ -113,6 +124,16 @@ class PatternAlphabet:
             InvalidInputError: Not one symbol for each slot, out of range, or repeated.
         """
         return self._index_of[self.check_pattern(pattern)]
+
+    def slot_likelihoods(self, likelihood: FloatArray) -> FloatArray:
+        """Return what a likelihood over 𝒵 says of each slot's symbol alone, summed over the others, shape [J, V].
+
+        With one slot that is the likelihood itself; with more it is what slots that know nothing of each other keep.
+        """
+        sums = [np.bincount(symbols, likelihood, self.n_symbols) for symbols in self.symbols.T]
+        scale = np.append(1.0, np.full(len(sums) - 1, 1.0 / max(likelihood.sum(), np.finfo(float).tiny)))
+        result: FloatArray = np.array(sums) * scale[:, None]
+        return result
 
     def check_pattern(self, pattern: Sequence[int], place: str = "pattern") -> Pattern:
         """Return ``pattern`` as a tuple of integers, or raise ``InvalidInputError`` naming ``place``."""
@@ -137,7 +158,7 @@ class PatternAlphabet:
                 raise InvalidInputError(f"{place}, slot {slot!r}: {brief(symbol)}; expected a whole number or null")
             if not 0 <= symbol < self.n_symbols:
                 raise InvalidInputError(f"{place}, slot {slot!r}: symbol {symbol}; expected 0 to {self.n_symbols - 1}")
-            if int(symbol) in symbols:
+            if self.exclusive and int(symbol) in symbols:
                 raise InvalidInputError(f"{place}, slot {slot!r}: symbol {symbol} is repeated; expected all different")
             symbols.append(int(symbol))
         return tuple(symbols)
@@ -151,35 +172,47 @@ class Evidence:
         likelihood: Non-negative weights, shape [|𝒵|]; 1 where a detection agrees, 0 where not. A copy of its own, which
             cannot be written to.
         pattern: Index of the pattern if the detection was complete, else ``None``.
+        detection: The symbol in each slot as it was seen, if the evidence is of a detection.
+        confidences: Of each of these symbols; empty if the detector says nothing of it.
     """
 
     likelihood: FloatArray
     pattern: int | None = None
+    detection: Detection | None = None
+    confidences: Confidences = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "likelihood", read_only(np.array(self.likelihood, dtype=np.float64)))
 
     def __reduce__(self) -> tuple[type, tuple[Any, ...]]:
-        return Evidence, (self.likelihood, self.pattern)  # so that no copy can be written to, either
+        return Evidence, (self.likelihood, self.pattern, self.detection, self.confidences)  # so that no copy can be written to, either
 
     @classmethod
-    def of_detection(cls, alphabet: PatternAlphabet, detection: Sequence[int | None]) -> Evidence:
+    def of_detection(
+        cls, alphabet: PatternAlphabet, detection: Sequence[int | None], confidences: Sequence[float | None] = ()
+    ) -> Evidence:
         """Evidence of a detection, ``None`` in each slot where nothing was seen.
 
+        Args:
+            alphabet: The patterns.
+            detection: The symbol in each slot.
+            confidences: Of each symbol, for models that learn what they mean; the likelihood takes no notice of them.
+
         Raises:
-            InvalidInputError: The detection does not fit the alphabet.
+            InvalidInputError: The detection does not fit the alphabet, or the confidences do not fit the detection.
         """
         checked = alphabet.check_detection(detection)
+        stated = check_confidences(confidences, len(checked))
         pattern = alphabet._index_of.get(checked)
         if pattern is not None:
             likelihood = np.zeros(len(alphabet))
             likelihood[pattern] = 1.0
-            return cls(likelihood, pattern)
+            return cls(likelihood, pattern, checked, stated)
         agrees = np.ones(len(alphabet), dtype=bool)
         for slot, symbol in enumerate(checked):
             if symbol is not None:
                 agrees &= alphabet.symbols[:, slot] == symbol
-        return cls(agrees.astype(np.float64))
+        return cls(agrees.astype(np.float64), None, checked, stated)
 
     @classmethod
     def of_likelihood(cls, alphabet: PatternAlphabet, likelihood: ArrayLike) -> Evidence:
@@ -208,3 +241,14 @@ class Evidence:
             )
         if self.pattern is not None:
             whole_number(self.pattern, "evidence: pattern", 0, n_patterns - 1)
+
+
+def check_confidences(confidences: Sequence[float | None], n_slots: int, place: str = "confidences") -> Confidences:
+    """Return confidences as a tuple, or raise ``InvalidInputError`` naming ``place``; none at all are as good."""
+    if len(confidences) not in (0, n_slots):
+        raise InvalidInputError(f"{place}: {len(confidences)}; expected one for each of {n_slots} slots, or none")
+    for value in confidences:
+        is_number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
+        if value is not None and not (is_number and math.isfinite(value)):
+            raise InvalidInputError(f"{place}: {brief(value)}; expected finite numbers or null")
+    return tuple(None if value is None else float(value) for value in confidences)

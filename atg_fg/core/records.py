@@ -9,13 +9,24 @@ from typing import Any, Final, Literal, TypeAlias, get_args
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.core.patterns import Detection, FloatArray
+from atg_fg.core.patterns import Confidences, Detection, FloatArray
 from atg_fg.core.table import Bar, Cell, Table, shortened, symbols_text
 
 #: How a trial can end.
 Verdict: TypeAlias = Literal["novel", "known", "lost", "undecided"]
 
 VERDICTS: Final[tuple[Verdict, ...]] = get_args(Verdict)
+
+
+def confidences_in(info: Mapping[str, Any]) -> Confidences:
+    """Return how sure the detector is of each symbol, as a world's ``info`` of a look has it; empty without."""
+    return tuple(info.get("confidences") or ())
+
+
+def confidences_of(looks: Sequence[Mapping[str, Any]]) -> tuple[Confidences, ...]:
+    """Return the confidences in the ``info`` of each look; empty if there are none at all."""
+    stated = tuple(confidences_in(info) for info in looks)
+    return stated if any(stated) else ()
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +54,11 @@ class TrialStep:
     action: int | None = None
     purpose: str | None = None
     total_variation_bound: float | None = None
+
+    @property
+    def confidences(self) -> Confidences:
+        """How sure the detector is of each symbol, as the world's ``info`` has it; empty if it does not say."""
+        return confidences_in(self.truth)
 
 
 @dataclass
@@ -95,6 +111,11 @@ class TrialRecord:
     def detections(self) -> list[Detection]:
         """The symbol seen in each slot at each look, ``None`` where nothing was."""
         return [step.detection for step in self.steps]
+
+    @property
+    def confidences(self) -> list[Confidences]:
+        """How sure the detector is of each symbol at each look; empty if it never says."""
+        return list(confidences_of([step.truth for step in self.steps]))
 
     @property
     def actions(self) -> list[int]:
@@ -234,6 +255,11 @@ class TrialSummary:
     def detections(self) -> tuple[Detection, ...]:
         """The symbol seen in each slot at each look, ``None`` where nothing was."""
         return tuple(step.observed for step in self.steps)
+
+    @property
+    def confidences(self) -> tuple[Confidences, ...]:
+        """How sure the detector was of each symbol at each look; empty if it never says."""
+        return confidences_of([step.truth for step in self.steps])
 
     @property
     def actions(self) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ A memory that has learned no structure leaves the Bayes filter alone.
 
 from __future__ import annotations
 
+import copy
 from typing import ClassVar, Final
 
 import numpy as np
@@ -22,11 +23,15 @@ from atg_fg.inference.chain import forward_backward
 from atg_fg.inference.interface import TrialSetup
 from atg_fg.inference.recognition_model import COLLECTION
 from atg_fg.learning.completion import pose_graph
+from atg_fg.learning.evidence_learner import BelievedChain
 from atg_fg.learning.learner import BelievedStructure
+from atg_fg.learning.path_filter import PathFilter
 from atg_fg.learning.pose_belief_tree import Following, StructureBelief
 from atg_fg.learning.pose_chain import pose_chain, pose_patterns
 from atg_fg.learning.pose_filter import PoseFilter
 from atg_fg.learning.rates import Rates
+from atg_fg.learning.raw_trials import RawTrial
+from atg_fg.learning.shared_structure import Poses
 from atg_fg.learning.structured_memory import StructuredMemory
 
 #: A structure less probable than this, given the trial so far, is left out of the rest of it.
@@ -52,10 +57,23 @@ class LearnedStructure(BayesFilter):
             believed, rates = self.memory.learner.believed(self.memory.names), self.memory.learner.rates
         followers = [each.weight * np.append(each.followers, rates.share) for each in believed]
         self._log_plain = log_of(1.0 - sum(followers, np.zeros(self.model.n_hypotheses)))
-        self._followed = [
+        self._followed: list[FollowedStructure | FollowedChain] = [
             FollowedStructure(each, log_of(self.model.prior * follow), rates, self.memory)
             for each, follow in zip(believed, followers, strict=True)
         ]
+        if self.parameters.learn_structure and isinstance(self.memory, StructuredMemory):
+            self._follow_chains(self.memory)
+
+    def _follow_chains(self, memory: StructuredMemory) -> None:
+        """Add the chains that were sampled from all raw trials, with the weight that their evidence gives them."""
+        log_erring, log_sharp = memory.log_erring_weights
+        chains = memory.evidence.believed(memory.names) if log_erring > -np.inf else []
+        if not chains:
+            return
+        self._log_plain = self._log_plain + log_sharp
+        self._followed = [each.weighted(log_sharp) for each in self._followed]
+        unusual = self.model.prior if self.prior is not None else None
+        self._followed += [FollowedChain(each, memory, log_erring, unusual) for each in chains]
 
     def _look(self, evidence: Evidence) -> None:
         super()._look(evidence)
@@ -83,6 +101,29 @@ class LearnedStructure(BayesFilter):
         if not self._followed:
             return super().log_evidence
         return log_sum_exp(np.concatenate(self._log_joints()))
+
+    def conclude(self) -> IdentityBelief:
+        """Return the belief at the end of the trial, all raw trials of the memory sampled again in its light.
+
+        What chains say of the object is then what they say once they have moved; how much they say it is as before.
+        """
+        looks, memory = self.history.evidence, self.memory
+        chains = [position for position, each in enumerate(self._followed) if isinstance(each, FollowedChain)]
+        seen = [look.detection for look in looks if look.detection is not None]
+        if not chains or not isinstance(memory, StructuredMemory) or len(seen) < len(looks) or self.prior is not None:
+            return self.identity()
+        confidences = tuple(look.confidences for look in looks) if any(look.confidences for look in looks) else ()
+        verdict = memory.evidence.conclude(RawTrial(tuple(seen), tuple(self.history.actions), confidences))
+        beliefs = self._type_beliefs()
+        erring = sum(float(beliefs[1 + position].sum()) for position in chains)
+        total = sum(beliefs[1:], beliefs[0]) - sum(
+            (beliefs[1 + position] for position in chains), np.zeros(self.model.n_hypotheses)
+        )
+        sampled = np.zeros(self.model.n_hypotheses)
+        sampled[-1] = verdict.probabilities[-1]
+        for name, probability in zip(verdict.names, verdict.probabilities[:-1].tolist(), strict=True):
+            sampled[memory.names.index(name)] += probability
+        return IdentityBelief.of(np.maximum(total, 0.0) + erring * sampled, self.model.n_unseen)
 
     def _log_joints(self) -> list[FloatArray]:
         """Return ln p(O, type, z_0:t | a_1:t) of being plain, then of following each structure, each of shape [H]."""
@@ -195,6 +236,12 @@ class FollowedStructure:
         contents = np.concatenate((believed.contents, new))
         self.filter = PoseFilter(self._poses, contents, rates, self._alphabet, log_weights)
 
+    def weighted(self, log_weight: float) -> FollowedStructure:
+        """Return the same structure, a factor less probable."""
+        twin = copy.copy(self)
+        twin._log_weights = self._log_weights + log_weight
+        return twin
+
     @property
     def log_joint(self) -> FloatArray:
         """Ln p(O, the object follows this structure, z_0:t | a_1:t), shape [H]."""
@@ -241,3 +288,61 @@ class FollowedStructure:
             total = given_pose.sum(axis=1)
             patterns.append((marginal / np.where(total > 0, total, 1.0)) @ given_pose)
         return patterns
+
+
+class FollowedChain:
+    """One chain of samples in a trial.
+
+    Args:
+        chain: The chain, and what it says of the remembered objects.
+        memory: For the noise and the assumptions.
+        log_weight: ln of the weight of all chains.
+        prior: p(O) in place of the chain's own, if it is not the memory's.
+
+    Attributes:
+        filter: Over paths and contents of each object and of *unseen*.
+    """
+
+    def __init__(
+        self, chain: BelievedChain, memory: StructuredMemory, log_weight: float, prior: FloatArray | None
+    ) -> None:
+        self._noise, self._alphabet = memory.evidence.noise, memory.assumptions.alphabet
+        weights = np.append(chain.is_there, np.exp(chain.log_new)) if prior is None else prior
+        self._log_weights: FloatArray = log_weight + np.log(chain.weight) + log_of(weights / weights.sum())
+        self.filter = PathFilter(chain, self._noise, self._alphabet, self._log_weights)
+        n_states = len(chain.registers)
+        self._poses = Poses(chain.registers, chain.successors.T, np.arange(n_states), np.full(n_states, 1.0 / n_states))
+        self._rates = Rates(slip=chain.slip, wrong=memory.evidence.noise.wrong)
+
+    def weighted(self, log_weight: float) -> FollowedChain:
+        """Return the same chain, a factor less probable."""
+        twin = copy.copy(self)
+        twin._log_weights = self._log_weights + log_weight
+        return twin
+
+    @property
+    def log_joint(self) -> FloatArray:
+        """Ln p(O, the chain, z_0:t | a_1:t), shape [H]."""
+        return self._log_weights + self.filter.log_evidence
+
+    def observe(self, evidence: Evidence) -> None:
+        """Take in the evidence of a look."""
+        self.filter.observe(evidence)
+
+    def components(self, belief: FloatArray) -> list[BeliefComponent]:
+        """Return the component of each probable object, with its states as aspects.
+
+        Args:
+            belief: p(O, the chain | z_0:t, a_1:t), shape [H].
+        """
+        components = []
+        for hypothesis in np.flatnonzero(belief >= LEAST_PROBABILITY).tolist():
+            contents = self.filter.learned_contents(hypothesis)
+            graph = pose_graph(self._poses, contents, self._rates, self._alphabet)
+            poses = self.filter.poses_of(hypothesis)
+            components.append(BeliefComponent(hypothesis, float(belief[hypothesis]), graph, poses))
+        return components
+
+    def smoothed_patterns(self, hypothesis: int, inference: LearnedStructure) -> list[FloatArray]:
+        """Return p(pattern shown at time s | O = hypothesis, all evidence) of every time s, each of shape [|𝒵|]."""
+        return self.filter.smoothed_patterns(hypothesis)

@@ -51,7 +51,7 @@ def learned_memory(
             inference = begin_trial("bayes-filter", RobotMemory(assumptions), _PLAIN)
             record = run_trial(made_world, inference, policy, n_actions, rng, reset_options={"object": number})
             name = memory.learn(record.patterns, record.actions, matched=None)
-            memory.learn_shared(name, record.detections, record.actions)
+            memory.learn_shared(name, record.detections, record.actions, record.confidences)
     return memory
 
 

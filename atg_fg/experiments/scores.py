@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final
 
+from atg_fg.core.memory import RobotMemory
 from atg_fg.core.records import TrialSummary
 from atg_fg.core.statistics import mean, mean_interval, standard_error, wilson_interval
 from atg_fg.core.table import ROWS, Bar, Cell, Table, shortened
 from atg_fg.learning.duplicates import Duplicate
+from atg_fg.learning.structured_memory import StructuredMemory
 
 
 @dataclass(frozen=True)
@@ -26,6 +29,8 @@ class TestResult:
         undecided: Trials in which nothing at all was seen.
         actions: Number of actions of each trial.
         merges: (false merges, merges), if duplicates were merged; false are those of ATGs made from two objects.
+        mended: (trials that at the end are with the ATG of their object, trials learned from), if any trial was given
+            to another ATG than its verdict had said.
     """
 
     __test__ = False
@@ -38,6 +43,7 @@ class TestResult:
     undecided: int = 0
     actions: tuple[int, ...] = ()
     merges: tuple[int, int] | None = None
+    mended: tuple[int, int] | None = None
 
     def _repr_html_(self) -> str:
         return table_of_tests([self])._repr_html_()
@@ -55,6 +61,8 @@ class Score:
         self.lost = self.undecided = 0
         self._actions: list[int] = []
         self.merges = self.false_merges = 0
+        self._learned_from: list[object] = []
+        self.mended: int | None = None
         self._made_from: dict[str, object] = dict(made_from or {})
         self._presented: set[object] = set(self._made_from.values())
 
@@ -75,8 +83,36 @@ class Score:
         self.recognised += seen_before and identified and right_match
         self.successes += identified and (right_match or not seen_before)
         self._presented.add(trial.object)
-        if learned is not None and trial.verdict == "novel":
-            self._made_from[learned] = trial.object
+        if learned is not None:
+            self._learned_from.append(trial.object)
+            if trial.verdict == "novel":
+                self._made_from[learned] = trial.object
+
+    def mend(self, memory: RobotMemory) -> None:
+        """Take note of raw trials that the memory has given to other ATGs than they had been.
+
+        An ATG that took part in this counts as made from the object that most of its trials were of, the first of them
+        if there are as many of others.
+        """
+        if not isinstance(memory, StructuredMemory) or not memory.reassignments:
+            return
+        owners = memory.learner.owners
+        if len(owners) != len(self._learned_from):
+            return  # trials from before this test are not ours to judge
+        by_name: defaultdict[str, Counter[object]] = defaultdict(Counter)
+        for name, presented in zip(owners, self._learned_from, strict=True):
+            by_name[name][presented] += 1
+        for name in {name for each in memory.reassignments for name in (each.old, each.new)}:
+            if name in by_name:
+                self._made_from[name] = by_name[name].most_common(1)[0][0]
+        largest: dict[object, str] = {}
+        for name, objects in by_name.items():
+            presented = self._made_from[name]
+            if presented not in largest or objects.total() > by_name[largest[presented]].total():
+                largest[presented] = name
+        self.mended = sum(
+            largest.get(presented) == name for name, presented in zip(owners, self._learned_from, strict=True)
+        )
 
     def has_met(self, presented: object) -> bool:
         """Whether an object was presented in a trial before."""
@@ -99,6 +135,7 @@ class Score:
             self.undecided,
             tuple(self._actions),
             (self.false_merges, self.merges) if merging else None,
+            None if self.mended is None else (self.mended, len(self._learned_from)),
         )
 
 

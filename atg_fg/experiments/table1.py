@@ -137,6 +137,7 @@ def run_test(
 def _learn_and_score(trial: TrialSummary, memory: RobotMemory, plan: TestPlan, score: Score) -> None:
     learned = learn_from(trial, memory)
     score.add(trial, learned)
+    score.mend(memory)
     if plan.merge_duplicates and learned is not None:
         score.add_merges(merge_duplicates(memory, plan.parameters, learned))
 

@@ -11,7 +11,7 @@ from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.patterns import Evidence
-from atg_fg.core.records import TrialRecord, TrialStep, TrialSummary
+from atg_fg.core.records import TrialRecord, TrialStep, TrialSummary, confidences_in
 from atg_fg.inference.interface import Inference
 from atg_fg.policies import Policy
 from atg_fg.worlds.base import World, detection_of
@@ -72,13 +72,14 @@ def run_trial(
     remaining = n_actions
     while True:
         detection = detection_of(observation)
-        evidence = Evidence.of_detection(assumptions.alphabet, detection)
+        evidence = Evidence.of_detection(assumptions.alphabet, detection, confidences_in(truth))
         inference.observe(evidence)
         choice = policy.choose(inference, rng) if remaining else None
+        ends = choice is None or choice.action is None
         step = TrialStep(
             detection,
             evidence.pattern,
-            inference.identity(),
+            inference.conclude() if ends else inference.identity(),
             inference.log_evidence,
             truth,
             choice.expected_entropies if choice else None,
@@ -110,7 +111,7 @@ def learn_from(record: TrialRecord | TrialSummary, memory: RobotMemory) -> str |
         if trial.verdict not in ("lost", "undecided") and any(pattern is not None for pattern in trial.patterns):
             actions = [memory.assumptions.action_index(action) for action in trial.actions[: len(trial.steps) - 1]]
             name = memory.learn(list(trial.patterns), actions, trial.matched)
-            memory.learn_shared(name, trial.detections, actions)
+            name = memory.learn_shared(name, trial.detections, actions, trial.confidences)
         if isinstance(record, TrialRecord):
             memory.add_record(record, name)
     return name

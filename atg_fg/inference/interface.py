@@ -119,6 +119,14 @@ class Inference(ABC):
             raise
         self._protect()
 
+    def conclude(self) -> IdentityBelief:
+        """Return the belief at the end of the trial, for the verdict.
+
+        It is ``identity`` of engines that have nothing more to find out; one that learns from all trials may look at
+        the past again in the light of this one.
+        """
+        return self.identity()
+
     def expected_entropies(self) -> FloatArray:
         """E[H(O | z_{t+1}, a, …)] of each action (eq. 3) in nats, shape [A].
 

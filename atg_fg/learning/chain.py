@@ -12,6 +12,7 @@ from atg_fg.learning import kernels, slip_kernels
 from atg_fg.learning.detector_noise import DetectorNoise
 from atg_fg.learning.kernels import Clusters, TrialArrays
 from atg_fg.learning.number_of_objects import log_new_weights, log_partition
+from atg_fg.learning.raw_trials import Recording
 
 #: Beta prior of a slip.
 SLIP_PRIOR: Final = (1.0, 99.0)
@@ -33,24 +34,6 @@ class Structure(NamedTuple):
     successors: IntArray
     registers: IntArray
     n_registers: int
-
-
-class Recording(NamedTuple):
-    """All raw trials side by side.
-
-    Attributes:
-        labels: Symbol seen in each slot at each look, −1 where none was, shape [N, T, J].
-        confidences: Of each label, not a number where none was given, shape [N, T, J].
-        actions: That were asked for after each look, shape [N, T].
-        lengths: Number of looks, shape [N].
-        n_symbols: V.
-    """
-
-    labels: IntArray
-    confidences: FloatArray
-    actions: IntArray
-    lengths: IntArray
-    n_symbols: int
 
 
 class Task(NamedTuple):

@@ -341,7 +341,7 @@ def trial_move(
 
 @compiled
 def count_votes(weights: FloatArray, free: int, votes: FloatArray) -> None:
-    """Add p(cluster), summed over the second axis of logarithms, to votes, *new* last."""
+    """Add p(cluster), summed over the second axis of logarithms, to votes, *new* after all that there are."""
     total = log_total(weights.ravel())
     for cluster in range(len(weights)):
         share = np.exp(weights[cluster] - total).sum()

@@ -116,19 +116,20 @@ class StructureLearner:
         self._plain: list[float] = []
         self._candidates: list[Candidate] = []
 
-    def learn(self, owner: str, trial: RawTrial) -> None:
+    def learn(self, owner: str, trial: RawTrial, *, search: bool = True) -> None:
         """Learn from one more trial.
 
         Args:
             owner: Name of its object.
             trial: What was seen and done.
+            search: Whether other structures may be searched for.
         """
         self._append(owner, trial)
         for candidate in self._candidates:
             candidate.extend(trial, self._owner_indices[-1], self.rates)
         self._candidates = self._worth_keeping()
         if is_milestone(len(self.trials)):
-            if self._is_worth_a_search():
+            if search and self._is_worth_a_search():
                 self._search()
             self._estimate_rates()
             self._candidates = self._worth_keeping()
@@ -180,6 +181,11 @@ class StructureLearner:
         """How many nats the best structure is better than none, its prior included; −∞ if there is none."""
         plain = np.array(self._plain)
         return max((each.score(plain) - float(plain.sum()) for each in self._candidates), default=-np.inf)
+
+    @property
+    def log_evidence(self) -> float:
+        """Ln p(all trials, each of a fresh object) of the best structure, its prior included, or of none."""
+        return float(sum(self._plain)) + max(self.gain, 0.0)
 
     def believed(self, names: Sequence[str]) -> list[BelievedStructure]:
         """Return the structures that are believed in, best first, for objects with these names.

@@ -16,6 +16,7 @@ from atg_fg.core.log_math import x_log_x
 from atg_fg.core.patterns import Evidence, FloatArray, IntArray
 from atg_fg.inference.expected_entropy import expected_entropies_of_table, next_pattern_joint, pattern_table
 from atg_fg.inference.recognition_model import RecognitionModel
+from atg_fg.learning.path_filter import PathFilter
 from atg_fg.learning.pose_filter import UNIMPORTANT, PoseFilter
 
 
@@ -27,7 +28,7 @@ class Following(NamedTuple):
         belief: p(O, the object follows it | …), shape [H].
     """
 
-    filter: PoseFilter
+    filter: PoseFilter | PathFilter
     belief: FloatArray
 
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.core.patterns import MISSING, Detection, IntArray
+from atg_fg.core.patterns import MISSING, Confidences, Detection, FloatArray, IntArray, check_confidences
 
 
 @dataclass(frozen=True)
@@ -20,10 +20,12 @@ class RawTrial:
     Attributes:
         detections: The symbol in each slot at each look, ``None`` where nothing was seen; t + 1 of them.
         actions: Index of the action between each two looks; t of them.
+        confidences: How sure the detector was of each symbol at each look, as it was given; empty if it never says.
     """
 
     detections: tuple[Detection, ...]
     actions: tuple[int, ...]
+    confidences: tuple[Confidences, ...] = ()
 
     def check(self, assumptions: Assumptions, place: str = "trial") -> None:
         """Raise ``InvalidInputError``, naming ``place``, if this is no trial under these assumptions."""
@@ -33,6 +35,12 @@ class RawTrial:
             )
         for look, detection in enumerate(self.detections):
             assumptions.alphabet.check_detection(detection, f"{place}: look {look}")
+        if len(self.confidences) not in (0, len(self.detections)):
+            raise InvalidInputError(
+                f"{place}: {len(self.confidences)} confidences; expected one for each of {len(self.detections)} looks"
+            )
+        for look, confidences in enumerate(self.confidences):
+            check_confidences(confidences, len(assumptions.alphabet.slots), f"{place}: look {look}: confidences")
         for action in self.actions:
             if not 0 <= action < len(assumptions.actions):
                 raise InvalidInputError(f"{place}: action {action}; expected 0 to {len(assumptions.actions) - 1}")
@@ -68,3 +76,34 @@ def side_by_side(trials: Sequence[RawTrial]) -> TrialArrays:
         symbols[number, : len(seen)] = seen
         actions[number, : len(trial.actions)] = trial.actions
     return TrialArrays(symbols, actions)
+
+
+class Recording(NamedTuple):
+    """All raw trials side by side, as they were given.
+
+    Attributes:
+        labels: Symbol seen in each slot at each look, ``MISSING`` where none was, shape [N, T, J].
+        confidences: Of each label, not a number where none was given, shape [N, T, J].
+        actions: That were asked for after each look, shape [N, T].
+        lengths: Number of looks, shape [N].
+        n_symbols: V.
+    """
+
+    labels: IntArray
+    confidences: FloatArray
+    actions: IntArray
+    lengths: IntArray
+    n_symbols: int
+
+    @classmethod
+    def of(cls, trials: Sequence[RawTrial], n_symbols: int) -> Recording:
+        """Return trials, at least one, as arrays."""
+        arrays = side_by_side(trials)
+        confidences = np.full(arrays.symbols.shape, np.nan)
+        for number, trial in enumerate(trials):
+            for look, stated in enumerate(trial.confidences):
+                if stated:
+                    confidences[number, look] = [np.nan if value is None else value for value in stated]
+        actions = np.concatenate((np.maximum(arrays.actions, 0), np.zeros((len(trials), 1), dtype=np.int64)), axis=1)
+        lengths = np.array([len(trial.detections) for trial in trials])
+        return cls(arrays.symbols, confidences, actions, lengths, n_symbols)

@@ -3,7 +3,12 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterable, Sequence
+import itertools
+from collections import Counter
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
 
 from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.assumptions import Assumptions
@@ -11,10 +16,31 @@ from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.merging import Merge
 from atg_fg.core.parameters import ModelParameters
-from atg_fg.core.patterns import Detection
+from atg_fg.core.patterns import Confidences, Detection, Evidence
 from atg_fg.core.transactions import one_transaction
+from atg_fg.learning.evidence_learner import EvidenceLearner
 from atg_fg.learning.learner import StructureLearner
 from atg_fg.learning.raw_trials import RawTrial
+
+#: Nats of evidence, and least number of trials, by which one model of looks outdoes the other so that it rests.
+OUTDONE: Final = 20.0
+FIRST_TRIALS: Final = 8
+
+
+class Reassignment(NamedTuple):
+    """A raw trial that was given to another ATG.
+
+    Attributes:
+        after: Number of raw trials by which this came to light.
+        trial: Number of the trial.
+        old: Name of the ATG that it was of.
+        new: Name of the one that it is of from then on.
+    """
+
+    after: int
+    trial: int
+    old: str
+    new: str
 
 
 class StructuredMemory(RobotMemory):
@@ -31,7 +57,7 @@ class StructuredMemory(RobotMemory):
             name trials which are not there.
 
     Attributes:
-        learner: The raw trials and the structures learned from them.
+        evidence: What is sampled from the same trials where looks err.
     """
 
     def __init__(
@@ -43,47 +69,180 @@ class StructuredMemory(RobotMemory):
     ) -> None:
         super().__init__(assumptions, graphs, merges)
         self.learner = learner or StructureLearner(assumptions)
+        self._reassignments: list[Reassignment] = []
         n_trials = len(self.learner.trials)
         for number, merge in enumerate(self.merges):
             for trial in merge.trials:
                 if not 0 <= trial < n_trials:
                     raise InvalidInputError(f"merges[{number}].trials: {trial}; expected less than {n_trials}")
 
+    @property
+    def learner(self) -> StructureLearner:
+        """The raw trials, and the structures learned from them where looks are nearly always right."""
+        return self._learner
+
+    @learner.setter
+    def learner(self, learner: StructureLearner) -> None:
+        self._learner = learner
+        self.evidence = EvidenceLearner(learner)
+        self._gain: float | None = None
+
     @one_transaction
-    def learn_shared(self, name: str, detections: Sequence[Detection], actions: Sequence[int]) -> None:
-        """Keep a raw trial, and learn from it what all objects share.
+    def learn_shared(
+        self,
+        name: str,
+        detections: Sequence[Detection],
+        actions: Sequence[int],
+        confidences: Sequence[Confidences] = (),
+    ) -> str:
+        """Keep a raw trial, and learn from it what all objects share; return the name of the ATG that it is of now.
+
+        Where looks err, raw trials of the past may turn out to be of other objects than they were taken for. Their
+        ATGs are then estimated again; what happened is in ``reassignments``.
 
         Args:
             name: Name of the ATG that the trial went to.
             detections: The symbol in each slot at each look, ``None`` where nothing was seen, length t + 1.
             actions: Index of the action between each two, length t.
+            confidences: How sure the detector was of each symbol at each look; none if it never says.
 
         Raises:
             UnknownNameError: There is no such ATG.
             InvalidInputError: It is no trial under these assumptions.
         """
-        trial = RawTrial(tuple(detections), tuple(actions))
+        trial = RawTrial(tuple(detections), tuple(actions), tuple(confidences))
         trial.check(self.assumptions)
-        self.learner.learn(self[name].name, trial)
+        before = self.gain if len(self.learner.trials) >= FIRST_TRIALS else 0.0
+        self.learner.learn(self[name].name, trial, search=before < OUTDONE)
+        # A model that is far behind rests; it looks at all trials again whenever their number has doubled.
+        if before > -OUTDONE or len(self.learner.trials).bit_count() == 1:
+            self.evidence.learn()
+            self._gain = self._evident_gain()
+            if self.erring:
+                self._mend()
+        return self.learner.owners[-1]
+
+    @property
+    def erring(self) -> bool:
+        """Whether looks err so much that the model in which they do explains the raw trials better."""
+        return self.log_erring_weights[0] > self.log_erring_weights[1]
+
+    @property
+    def reassignments(self) -> tuple[Reassignment, ...]:
+        """Raw trials that were given to other ATGs than they had been, in their order."""
+        return tuple(self._reassignments)
+
+    @one_transaction
+    def reassign(self, trials: Mapping[int, str]) -> None:
+        """Give raw trials to other ATGs, which are estimated again from theirs; giving them back undoes it.
+
+        An ATG that has no trial left is no more; a name that is not there is that of a new one. What an ATG knows from
+        elsewhere than raw trials it keeps, and ATGs that were merged stay as they are.
+
+        Args:
+            trials: Name of the new ATG of each trial, by its number.
+
+        Raises:
+            InvalidInputError: There is no such trial.
+        """
+        owners = self.learner.owners
+        for number in trials:
+            if not 0 <= number < len(owners):
+                raise InvalidInputError(f"reassign: trial {number}; expected less than {len(owners)}")
+        merged = {graph.name for merge in self.merges for graph in (merge.kept, merge.dropped)}
+        moved = {
+            number: name
+            for number, name in trials.items()
+            if owners[number] != name and not {owners[number], name} & merged
+        }
+        touched = dict.fromkeys([*(owners[number] for number in moved), *moved.values()])
+        own = [name for name in touched if name not in self._graphs or self._graphs[name] == self._estimated(name)]
+        for number, name in moved.items():
+            self._reassignments.append(Reassignment(len(owners), number, owners[number], name))
+            self.learner.hand_over([number], name)
+        self.evidence.forget_verdict()
+        for name in own:
+            if name in owners:
+                self._graphs[name] = self._estimated(name)
+            else:
+                del self._graphs[name]
+
+    def _estimated(self, name: str) -> AspectTransitionGraph:
+        """Return the ATG that the raw trials of a name make."""
+        graph = AspectTransitionGraph(name, self.assumptions)
+        for trial, owner in zip(self.learner.trials, self.learner.owners, strict=True):
+            if owner == name:
+                patterns = [Evidence.of_detection(self.assumptions.alphabet, each).pattern for each in trial.detections]
+                graph.learn(patterns, list(trial.actions))
+        return graph
+
+    def _mend(self) -> None:
+        """Give raw trials to the ATGs that what was sampled says; a name stays with what most of its looks are of."""
+        owners, objects = self.learner.owners, self.evidence.objects()
+        looks: Counter[tuple[int, str]] = Counter()
+        for trial, name, number in zip(self.learner.trials, owners, objects, strict=True):
+            looks[number, name] += len(trial.detections)
+        names: dict[int, str] = {}
+        # Of as many looks, the object that was met first keeps the name.
+        for (number, name), _ in sorted(looks.items(), key=lambda entry: -entry[1]):
+            if number not in names and name not in names.values():
+                names[number] = name
+        for number in dict.fromkeys(objects):
+            if number not in names:
+                taken = {*self._graphs, *self._dropped, *names.values()}
+                new = (f"object-{index:03d}" for index in itertools.count(len(taken)))
+                names[number] = next(name for name in new if name not in taken)
+        self.reassign({trial: names[number] for trial, number in enumerate(objects)})
+
+    @property
+    def log_erring_weights(self) -> tuple[float, float]:
+        """Ln of the weight of the model in which looks err, and of the one in which they are nearly always right.
+
+        Both are weighed by the evidence of all raw trials, each taken for one of a fresh object. Where symbols repeat
+        within a pattern there is only the former.
+        """
+        if abs(self.gain) > OUTDONE:
+            return (0.0, -np.inf) if self.gain > 0 else (-np.inf, 0.0)
+        return -float(np.logaddexp(0.0, -self.gain)), -float(np.logaddexp(0.0, self.gain))
+
+    @property
+    def gain(self) -> float:
+        """How many nats the model in which looks err is ahead; ∞ where there is no other."""
+        if self._gain is None:
+            self._gain = self._evident_gain()
+        return self._gain
+
+    def _evident_gain(self) -> float:
+        if not self.assumptions.alphabet.exclusive:
+            return np.inf
+        return self.evidence.log_evidence - self.learner.log_evidence if self.learner.trials else 0.0
 
     def _merge_shared(self, keep: str, drop: str) -> tuple[int, ...]:
         trials = tuple(number for number, owner in enumerate(self.learner.owners) if owner == drop)
         self.learner.hand_over(trials, keep)
+        self.evidence.forget_verdict()
         return trials
 
     def _unmerge_shared(self, merge: Merge) -> None:
         self.learner.hand_over(merge.trials, merge.dropped.name)
+        self.evidence.forget_verdict()
 
     def become(self, other: RobotMemory) -> None:
         """Have what another memory has, under the same assumptions; if that has no structure, none is learned yet."""
         super().become(other)
         known = other.learner if isinstance(other, StructuredMemory) else None
         self.learner = known or StructureLearner(self.assumptions)
+        if isinstance(other, StructuredMemory):
+            self.evidence, self._gain = other.evidence, other._gain
+            self._reassignments = list(other._reassignments)
 
     def copy(self) -> StructuredMemory:
         """Return a memory that can learn without touching this one."""
         graphs = (graph.copy() for graph in self)
-        return StructuredMemory(self.assumptions, graphs, copy.deepcopy(self.learner), self.merges)
+        twin = StructuredMemory(self.assumptions, graphs, copy.deepcopy(self.learner), self.merges)
+        twin.evidence, twin._gain = self.evidence.copy(twin.learner), self._gain
+        twin._reassignments = list(self._reassignments)
+        return twin
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, RobotMemory):

@@ -89,7 +89,7 @@ def _read_merge(value: Any, assumptions: Assumptions, place: str) -> Merge:
 
 def read_assumptions(value: Any, place: str) -> Assumptions:
     """Return the assumptions at ``place``."""
-    fields = read_object(value, place, ("n_objects", "n_aspects", "actions", "slots", "n_symbols"))
+    fields = read_object(value, place, ("n_objects", "n_aspects", "actions", "slots", "n_symbols"), ("exclusive",))
     texts = {
         key: tuple(
             plain_text(name, f"{place}.{key}[{index}]")
@@ -101,7 +101,7 @@ def read_assumptions(value: Any, place: str) -> Assumptions:
         key: whole_number(fields[key], f"{place}.{key}", least=1) for key in ("n_objects", "n_aspects", "n_symbols")
     }
     with placed(place):
-        alphabet = PatternAlphabet(texts["slots"], numbers["n_symbols"])
+        alphabet = PatternAlphabet(texts["slots"], numbers["n_symbols"], fields.get("exclusive", True))
         return Assumptions(numbers["n_objects"], numbers["n_aspects"], texts["actions"], alphabet)
 
 
@@ -113,6 +113,8 @@ def write_assumptions(assumptions: Assumptions) -> dict[str, Any]:
         "actions": list(assumptions.actions),
         "slots": list(assumptions.alphabet.slots),
         "n_symbols": assumptions.alphabet.n_symbols,
+        # Left out where it is as usual: what was written before has no word of it.
+        **({} if assumptions.alphabet.exclusive else {"exclusive": False}),
     }
 
 

@@ -6,6 +6,7 @@ Importing this package registers its worlds with gymnasium; the module of a worl
 import gymnasium
 
 gymnasium.register(id="atg_fg/ARcube-v0", entry_point="atg_fg.worlds.arcube_world:ARcubeWorld")
+gymnasium.register(id="atg_fg/Detector-v0", entry_point="atg_fg.worlds.detector_world:DetectorWorld")
 
 for _id, _family in {
     "HexagonalPrism": "prism",

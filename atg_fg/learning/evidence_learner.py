@@ -1,0 +1,205 @@
+"""What is learned from raw trials whose looks err: which are of one object, what all objects share, how looks err.
+
+At the end of each trial all raw trials are sampled again. What is believed depends on the trials, their order and the
+seed alone.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Final, NamedTuple
+
+import numpy as np
+
+from atg_fg.core.patterns import FloatArray, IntArray
+from atg_fg.learning.detector_noise import DetectorNoise
+from atg_fg.learning.learner import StructureLearner
+from atg_fg.learning.raw_trials import RawTrial, Recording
+
+#: Chains of less weight are not followed through a trial.
+LEAST_WEIGHT: Final = 1e-3
+
+# Compiled code takes longer to load than all else, so it is loaded where it is used.
+if TYPE_CHECKING:
+    from atg_fg.learning.chain import Chain, Task
+    from atg_fg.learning.populations import Population
+
+
+class BelievedChain(NamedTuple):
+    """One chain, with what it says of the K remembered objects.
+
+    Attributes:
+        weight: Of the chain; with those of the others it sums to one.
+        successors: The state that each action leads to, shape [A, S].
+        registers: The register in each slot in each state, shape [S, J].
+        tables: p(symbol in each register) of each object, and last of a new one, shape [K + 1, R, V].
+        is_there: Whether the chain knows a cluster of each object, shape [K].
+        slip: ε.
+        log_new: ln of the weight of a new object beside each known one.
+    """
+
+    weight: float
+    successors: IntArray
+    registers: IntArray
+    tables: FloatArray
+    is_there: IntArray
+    slip: float
+    log_new: float
+
+
+class Verdict(NamedTuple):
+    """What is believed of the last trial, once all are sampled again.
+
+    Attributes:
+        names: Of the objects of all trials before.
+        probabilities: p(the trial is of the object of each name), *new* last, shape [names + 1].
+    """
+
+    names: tuple[str, ...]
+    probabilities: FloatArray
+
+
+class _State(NamedTuple):
+    """All that is learned: replaced, never changed."""
+
+    population: Population | None
+    noise: DetectorNoise
+    weights: FloatArray
+    n_trials: int
+    log_evidence: float
+
+
+class EvidenceLearner:
+    """Learns from the raw trials that a structure learner keeps.
+
+    Args:
+        learner: Has the trials, the names of their objects, and the seed.
+    """
+
+    def __init__(self, learner: StructureLearner) -> None:
+        self.learner, self.assumptions, self.seed = learner, learner.assumptions, learner.seed
+        noise = DetectorNoise.unknown(self.assumptions.alphabet.n_symbols)
+        self._state = _State(None, noise, np.zeros(0), 0, 0.0)
+        self._concluded: tuple[RawTrial, _State, Verdict] | None = None
+
+    def copy(self, learner: StructureLearner) -> EvidenceLearner:
+        """Return one that has learned the same, of another learner with the same trials."""
+        twin = EvidenceLearner(learner)
+        twin._state = copy.deepcopy(self._state)
+        return twin
+
+    @property
+    def noise(self) -> DetectorNoise:
+        """How looks err."""
+        return self._current.noise
+
+    @property
+    def log_evidence(self) -> float:
+        """Ln p(all trials, each of a fresh object) + ln p(structure) of the best structure."""
+        return self._current.log_evidence
+
+    def conclude(self, trial: RawTrial) -> Verdict:
+        """Return what is believed of a trial that has ended, all others sampled again; nothing is learned yet."""
+        if self._concluded is None or self._concluded[1].n_trials != len(self.learner.trials) + 1:
+            self._concluded = None
+        if self._concluded is None or self._concluded[0] != trial:
+            state, verdict = self._sampled(self._current, [*self.learner.trials, trial], self.learner.owners)
+            self._concluded = trial, state, verdict
+        return self._concluded[2]
+
+    def learn(self) -> None:
+        """Learn from the trial that the learner has just been given."""
+        trials, owners = self.learner.trials, self.learner.owners
+        done, self._concluded = self._concluded, None
+        if done is not None and done[0] == trials[-1] and done[1].n_trials == len(trials):
+            self._state = done[1]
+        elif self._state.n_trials == len(trials) - 1:
+            self._state = self._sampled(self._state, trials, owners[:-1])[0]
+
+    def forget_verdict(self) -> None:
+        """Sample again before the next verdict: trials have changed hands."""
+        self._concluded = None
+
+    def believed(self, names: Sequence[str]) -> list[BelievedChain]:
+        """Return the chains, as far as they matter, for objects with these names."""
+        state, trials = self._current, self.learner.trials
+        if state.population is None:
+            return []
+        task, numbers = self._task(trials, state.noise), self._numbers(self.learner.owners, names)
+        return [
+            _believed(chain, weight, task, numbers, len(names))
+            for chain, weight in zip(state.population.chains, state.weights.tolist(), strict=True)
+            if weight > LEAST_WEIGHT
+        ]
+
+    def objects(self) -> list[int]:
+        """Return which trials are of one object by the best chain: a number each, the same for the same object."""
+        state = self._current
+        if state.population is None:
+            return []
+        owners: list[int] = state.population.chains[int(state.weights.argmax())].clusters.owner.tolist()
+        return owners
+
+    @property
+    def _current(self) -> _State:
+        """What is learned from all trials; those that came in a file without it are sampled all at once."""
+        trials, owners = self.learner.trials, self.learner.owners
+        if self._state.n_trials != len(trials):
+            self._state = self._sampled(self._state, trials, owners[:-1])[0]
+        return self._state
+
+    def _sampled(self, state: _State, trials: Sequence[RawTrial], owners: Sequence[str]) -> tuple[_State, Verdict]:
+        """Return what is learned from trials, the last of which has no owner yet, and the verdict on it."""
+        names = tuple(dict.fromkeys(owners))
+        numbers = np.append(self._numbers(owners, names), -1)
+        rng = np.random.default_rng((self.seed, len(trials)))
+        population = copy.deepcopy(state.population) or self._population()
+        task = self._task(trials, state.noise)
+        conclusion = population.advance(task, numbers, rng)
+        noise = population.tally(task, conclusion.weights, state.noise)
+        log_evidence = population.log_evidence(task) - self._log_scale(task)
+        learned = _State(population, noise, conclusion.weights, len(trials), log_evidence)
+        return learned, Verdict(names, conclusion.probabilities)
+
+    def _population(self) -> Population:
+        from atg_fg.learning.populations import AutomatonPopulation, RegisterPopulation
+
+        alphabet, n_actions = self.assumptions.alphabet, len(self.assumptions.actions)
+        n_slots = len(alphabet.slots)
+        if n_slots == 1 and not alphabet.exclusive:
+            return AutomatonPopulation(self.assumptions.n_aspects, n_slots, n_actions, alphabet.n_symbols)
+        return RegisterPopulation(n_slots, n_actions, alphabet.n_symbols)
+
+    def _task(self, trials: Sequence[RawTrial], noise: DetectorNoise) -> Task:
+        from atg_fg.learning.chain import Task
+
+        recording = Recording.of(trials, self.assumptions.alphabet.n_symbols)
+        return Task.of(recording, noise, self.assumptions.n_objects)
+
+    def _log_scale(self, task: Task) -> float:
+        """Return ln of the factor that the likelihoods of all labels have been scaled by."""
+        return float(np.count_nonzero(task.recording.labels >= 0) * np.log(task.recording.n_symbols))
+
+    @staticmethod
+    def _numbers(owners: Sequence[str], names: Sequence[str]) -> IntArray:
+        number = {name: index for index, name in enumerate(names)}
+        return np.array([number.get(owner, -1) for owner in owners], dtype=np.int64)
+
+
+def _believed(chain: Chain, weight: float, task: Task, numbers: IntArray, n_names: int) -> BelievedChain:
+    """Return a chain with the tables of objects by name; one of which it has several clusters has the largest."""
+    chain.log_joint(task)  # its tables are made anew, with the noise in force
+    clusters = chain.clusters
+    names = chain.objects(numbers, task)
+    tables = np.broadcast_to(clusters.prior, (n_names + 1, *clusters.tables.shape[1:])).copy()
+    is_there, size = np.zeros(n_names, dtype=np.int64), np.zeros(n_names)
+    for cluster in np.flatnonzero(names >= 0).tolist():
+        name = int(names[cluster])
+        if clusters.n_trials[cluster] > size[name]:
+            tables[name], size[name], is_there[name] = clusters.tables[cluster], clusters.n_trials[cluster], 1
+    n_objects = int(np.count_nonzero(clusters.n_trials))
+    structure = clusters.successors[0, :-1]
+    return BelievedChain(
+        weight, structure, clusters.registers, tables, is_there, chain.slip, float(task.log_new[n_objects])
+    )

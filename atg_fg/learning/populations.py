@@ -1,0 +1,272 @@
+"""Populations of chains: several, for one chain gets stuck. Their weighted average is what is believed.
+
+All objects share one structure: an automaton, whose transitions move with all else, or register maps, which a search
+on the exact evidence proposes and of which each chain holds one.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from functools import partial
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from atg_fg.core.errors import TooLargeError
+from atg_fg.core.patterns import FloatArray, IntArray
+from atg_fg.learning import kernels
+from atg_fg.learning.chain import Chain, Structure, Task
+from atg_fg.learning.detector_noise import DetectorNoise
+from atg_fg.learning.register_search import search_registers
+from atg_fg.learning.shared_structure import SharedStructure
+
+#: A chain this many nats behind the best is given up.
+HOPELESS: Final = 15.0
+#: Chains of automata, their sweeps a trial, and how much their scores are tempered: these are means over few sweeps.
+N_AUTOMATA: Final = 6
+AUTOMATON_SWEEPS: Final = 12
+AUTOMATON_TEMPERATURE: Final = 2.0
+#: Sweeps of a chain that is made anew, and how hot it begins.
+RESTART_SWEEPS: Final = 40
+RESTART_HOTTEST: Final = 0.1
+#: States of an automaton beyond |G|; states that are not needed cost nothing. At least, and at most, so many.
+SPARE_STATES: Final = 2
+LEAST_STATES: Final = 8
+MOST_STATES: Final = 12
+#: Register maps believed in at once, how many nats the others may be behind the best, and their sweeps a trial.
+MAX_MAPS: Final = 4
+MAPS_WITHIN: Final = 12.0
+MAP_SWEEPS: Final = 5
+#: Trials from which on a map that is left alone is settled.
+SETTLED_TRIALS: Final = 3
+
+
+class Conclusion(NamedTuple):
+    """What a population makes of the last trial.
+
+    Attributes:
+        probabilities: p(the trial is of the object of each name | all trials), *new* last, shape [names + 1].
+        weights: Of the chains, in their order; they sum to one.
+    """
+
+    probabilities: FloatArray
+    weights: FloatArray
+
+
+def is_milestone(n_trials: int) -> bool:
+    """Return whether structures are searched for after this many trials: ever more rarely, by a quarter each time."""
+    milestone = 8
+    while milestone < n_trials:
+        milestone = -(-milestone * 5 // 4)
+    return n_trials <= 8 or milestone == n_trials
+
+
+class Population(ABC):
+    """Chains that take in trial after trial.
+
+    Attributes:
+        chains: What is believed.
+    """
+
+    def __init__(self) -> None:
+        self.chains: list[Chain] = []
+
+    @abstractmethod
+    def advance(self, task: Task, names: IntArray, rng: np.random.Generator) -> Conclusion:
+        """Take in the last trial of a task.
+
+        Args:
+            task: All trials; the population knows all but the last one.
+            names: Number of the name of each trial, −1 of the last one, shape [N].
+            rng: Draws.
+        """
+
+    @abstractmethod
+    def log_evidence(self, task: Task) -> float:
+        """Return ln p(all trials, each of a fresh object) + ln p(structure) of the best structure."""
+
+    def tally(self, task: Task, weights: FloatArray, noise: DetectorNoise) -> DetectorNoise:
+        """Return the noise that the chains estimate."""
+        recording = task.recording
+        right = np.zeros(recording.labels.shape)
+        truth = np.zeros((recording.n_symbols, recording.n_symbols))
+        for chain, weight in zip(self.chains, weights.tolist(), strict=True):
+            if weight > 0.01:
+                chain.tally(task, weight / weights[weights > 0.01].sum(), right, truth)
+        return noise.learned(recording.labels, recording.confidences, right, truth)
+
+    def _conclude(self, votes: list[FloatArray], temperature: float) -> Conclusion:
+        scores = np.array([chain.score for chain in self.chains])
+        weights = np.exp((scores - scores.max()) / temperature)
+        weights /= weights.sum()
+        shares = np.array([each / each.sum() for each in votes])
+        return Conclusion(weights @ shares, weights)
+
+
+def _votes_by_name(chain: Chain, votes: FloatArray, names: IntArray, task: Task) -> FloatArray:
+    """Return votes for clusters as votes for names, *new* last; a cluster has the name that most of its looks have."""
+    objects = chain.objects(names, task)
+    result = np.zeros(int(names.max(initial=-1)) + 2)
+    there = objects >= 0
+    np.add.at(result, objects[there], votes[:-1][there])
+    result[-1] = votes[-1]
+    return result
+
+
+class AutomatonPopulation(Population):
+    """Chains of automata that all objects share.
+
+    Args:
+        n_aspects: |G|.
+        n_slots: J.
+        n_actions: A.
+        n_symbols: V.
+    """
+
+    def __init__(self, n_aspects: int, n_slots: int, n_actions: int, n_symbols: int) -> None:
+        super().__init__()
+        self._n_states = min(max(n_aspects + SPARE_STATES, LEAST_STATES), MOST_STATES)
+        self._n_slots, self._n_actions, self._n_symbols = n_slots, n_actions, n_symbols
+
+    def advance(self, task: Task, names: IntArray, rng: np.random.Generator) -> Conclusion:
+        """Take in the last trial of a task; at milestones, make the worst chain anew."""
+        if not self.chains:
+            begin = self._new if len(names) == 1 else partial(self._annealed, task)
+            self.chains = [begin(rng) for _ in range(N_AUTOMATA)]
+        elif is_milestone(len(names)):
+            worst = int(np.argmin([chain.score for chain in self.chains]))
+            self.chains[worst] = self._annealed(task, rng)
+        votes = []
+        for chain in self.chains:
+            if len(chain.clusters.owner) < len(names):
+                known = len(chain.clusters.owner)
+                chain.admit(task)
+                chain.place(task, np.arange(known, len(names)), rng)
+            own, scores = np.zeros(int(names.max(initial=-1)) + 2), []
+            for sweep in range(AUTOMATON_SWEEPS):
+                own += _votes_by_name(chain, chain.sweep(task, rng, automaton=True), names, task)
+                if sweep >= AUTOMATON_SWEEPS // 2:
+                    scores.append(chain.log_joint(task))
+            chain.score = float(np.mean(scores))
+            votes.append(own)
+        conclusion = self._conclude(votes, AUTOMATON_TEMPERATURE)
+        best = max(self.chains, key=lambda chain: chain.score)
+        self.chains = [chain if chain.score > best.score - HOPELESS else best.copy() for chain in self.chains]
+        return conclusion
+
+    def log_evidence(self, task: Task) -> float:
+        """Return ln p(all trials, each of a fresh object) + ln p(automaton) of the best chain."""
+        best = max(self.chains, key=lambda chain: chain.score)
+        fresh = kernels.fresh_log_evidence(
+            best.trials(task),
+            best.clusters.successors[0],
+            best.clusters.registers,
+            len(best.clusters.tables[0]),
+            best.clusters.prior,
+        )
+        return float(fresh.sum()) - self._n_actions * self._n_states * float(np.log(self._n_states))
+
+    def _new(self, rng: np.random.Generator) -> Chain:
+        successors = rng.integers(self._n_states, size=(self._n_actions, self._n_states))
+        registers = np.arange(self._n_states * self._n_slots).reshape(self._n_states, self._n_slots)
+        return Chain(Structure(successors, registers, registers.size), 0.0, self._n_symbols)
+
+    def _annealed(self, task: Task, rng: np.random.Generator) -> Chain:
+        chain = self._new(rng)
+        chain.admit(task)
+        chain.scatter(rng)
+        chain.log_joint(task)
+        for beta in np.geomspace(RESTART_HOTTEST, 1.0, RESTART_SWEEPS).tolist():
+            chain.sweep(task, rng, beta, automaton=True)
+        return chain
+
+
+class RegisterPopulation(Population):
+    """Chains of register maps, one for each map that is believed in.
+
+    Args:
+        n_slots: J.
+        n_actions: A.
+        n_symbols: V.
+    """
+
+    def __init__(self, n_slots: int, n_actions: int, n_symbols: int) -> None:
+        super().__init__()
+        self._n_slots, self._n_actions, self._n_symbols = n_slots, n_actions, n_symbols
+        self.maps: list[SharedStructure] = []
+
+    def advance(self, task: Task, names: IntArray, rng: np.random.Generator) -> Conclusion:
+        """Take in the last trial of a task; at milestones, search for other maps."""
+        if is_milestone(len(names)) or not self.chains:
+            self._search(task, rng)
+        votes = []
+        for chain in self.chains:
+            known = len(chain.clusters.owner)
+            if known < len(names):
+                chain.admit(task)
+                chain.place(task, np.arange(known, len(names)), rng)
+            own, scores = np.zeros(int(names.max(initial=-1)) + 2), []
+            for sweep in range(MAP_SWEEPS):
+                found = chain.slip_sweep(task, rng, thorough=sweep % 2 == 1)
+                own += _votes_by_name(chain, found, names, task)
+                if sweep >= MAP_SWEEPS // 2:
+                    scores.append(chain.log_joint(task))
+                if sweep + 1 < MAP_SWEEPS:
+                    chain.sweep(task, rng)
+            chain.score = float(np.mean(scores))
+            votes.append(own)
+        conclusion = self._conclude(votes, 1.0)
+        best = max(chain.score for chain in self.chains)
+        kept = [number for number, chain in enumerate(self.chains) if chain.score > best - HOPELESS]
+        self.chains, self.maps = [self.chains[number] for number in kept], [self.maps[number] for number in kept]
+        weights = conclusion.weights[kept]
+        return conclusion._replace(weights=weights / weights.sum())
+
+    def log_evidence(self, task: Task) -> float:
+        """Return ln p(all trials, each of a fresh object) + ln p(maps) of the best maps."""
+        best = max(range(len(self.chains)), key=lambda number: self.chains[number].score)
+        return self._total(task, self.chains[best].structure, self.maps[best].log_prior)
+
+    def _total(self, task: Task, structure: Structure, log_prior: float) -> float:
+        recording = task.recording
+        trials = kernels.TrialArrays(task.looks, recording.actions, recording.lengths)
+        prior = np.full(self._n_symbols, 1.0 / self._n_symbols)
+        fresh = kernels.fresh_log_evidence(
+            trials, structure.successors, structure.registers, structure.n_registers, prior
+        )
+        return float(fresh.sum()) + log_prior
+
+    def _search(self, task: Task, rng: np.random.Generator) -> None:
+        """Have a chain for each of the best maps, of those at hand and those that a search proposes."""
+        n_trials = len(task.recording.lengths)
+        is_settled = n_trials > SETTLED_TRIALS and len(self.chains) == 1
+        if is_settled and n_trials.bit_count() > 1:
+            return  # what is far ahead of all else is looked at again when the trials have doubled
+        trials = kernels.TrialArrays(task.looks, task.recording.actions, task.recording.lengths)
+        nothing_else = np.full(n_trials, -np.inf)
+        found = search_registers(trials, nothing_else, self._n_slots, self._n_actions, 1 if is_settled else 2, rng)
+        scored: list[tuple[float, SharedStructure, Structure]] = []
+        for each in dict.fromkeys((*self.maps, *found)):
+            try:
+                structure = compiled_maps(each)
+            except TooLargeError:
+                continue  # more poses than a structure may have
+            scored.append((self._total(task, structure, each.log_prior), each, structure))
+        scored.sort(key=lambda entry: -entry[0])
+        at_hand = dict(zip(self.maps, self.chains, strict=True))
+        self.maps, self.chains = [], []
+        for score, each, structure in scored[:MAX_MAPS]:
+            if score > scored[0][0] - MAPS_WITHIN:
+                self.maps.append(each)
+                self.chains.append(at_hand.get(each) or Chain(structure, each.log_prior, self._n_symbols))
+
+
+def compiled_maps(maps: SharedStructure) -> Structure:
+    """Return register maps in the form that all structures compile to: their poses are the states.
+
+    Raises:
+        TooLargeError: There are more poses than a structure may have.
+    """
+    poses = maps.poses()
+    successors = np.ascontiguousarray(poses.successors.T)
+    return Structure(successors, np.ascontiguousarray(poses.registers[:, : maps.n_slots]), maps.n_registers)
