@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from atg_fg.core.aspect_graph import AspectTransitionGraph
+from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.merging import Merge
 from atg_fg.learning.structured_memory import StructuredMemory
@@ -51,7 +52,15 @@ def held_by(connection: sqlite3.Connection, memory: RobotMemory) -> Held:
 
 
 def replace_memory(connection: sqlite3.Connection, memory: RobotMemory) -> Held:
-    """Write a whole memory in place of what is there; records of trials stay. Inside of a transaction."""
+    """Write a whole memory in place of what is there; records of trials stay. Inside of a transaction.
+
+    Raises:
+        InvalidInputError: The alphabet is without exclusion, of which a database has no word.
+    """
+    if not memory.assumptions.alphabet.exclusive:
+        raise InvalidInputError(
+            "database: slots that do not exclude each other; expected a JSON file for such a memory"
+        )
     changed = _assumptions_differ(connection, memory)
     tables = ("raw_trials", "structure", "merges", "transitions", "aspects", "graphs", "actions", "slots")
     for table in (*tables, "assumptions"):
