@@ -185,7 +185,12 @@ class Evidence:
         object.__setattr__(self, "likelihood", read_only(np.array(self.likelihood, dtype=np.float64)))
 
     def __reduce__(self) -> tuple[type, tuple[Any, ...]]:
-        return Evidence, (self.likelihood, self.pattern, self.detection, self.confidences)  # so that no copy can be written to, either
+        return Evidence, (
+            self.likelihood,
+            self.pattern,
+            self.detection,
+            self.confidences,
+        )  # so that no copy can be written to, either
 
     @classmethod
     def of_detection(
