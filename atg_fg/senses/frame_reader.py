@@ -113,6 +113,8 @@ def _of_images(name: str) -> Iterator[tuple[float, Any]]:
 def _rgb(image: Any) -> Any:
     import cv2
 
+    if image.shape[0] * image.shape[1] > MOST_PIXELS:
+        raise ValueError(f"{image.shape[1]} by {image.shape[0]} pixels, more than {MOST_PIXELS}")
     if image.ndim == 2:
         return cv2.cvtColor(image, cv2.COLOR_GRAY2RGB)
     return cv2.cvtColor(image, cv2.COLOR_BGR2RGB)

@@ -1,0 +1,120 @@
+import numpy as np
+import pytest
+
+pytest.importorskip("cv2", reason="OpenCV is not installed: pip install atg-fg[vision]")
+
+from atg_fg.core.assumptions import Assumptions, arcube_assumptions
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.patterns import PatternAlphabet
+from atg_fg.experiments.live_session import Asked, Ended, LiveSession, Looked, Noted
+from atg_fg.policies import make_policy
+from atg_fg.senses.tags import TagDetector, Tags
+from atg_fg.senses.turns import Patience, TurnWatcher
+from atg_fg.senses.video import Frame
+from atg_fg.storage.presets import preset
+from atg_fg.worlds.arcube import ACTION_ROTATIONS
+from tests.senses.images import INTRINSICS, cube_picture
+
+FACES = (0, 1, 2, 3, 4, 5)
+BLANK = np.full((480, 640, 3), 120, dtype=np.uint8)
+LEFT, FLIP = ACTION_ROTATIONS["left"], ACTION_ROTATIONS["flip"]
+
+
+def begin(memory=None, **options):
+    detector = TagDetector(Tags("5X5_50", 0.042, INTRINSICS, symbols={tag: tag for tag in range(12)}))
+    watcher = TurnWatcher(ACTION_ROTATIONS, patience=Patience.of_pictures())
+    memory = RobotMemory(arcube_assumptions()) if memory is None else memory
+    return LiveSession(detector, watcher, memory, preset("default"), make_policy("entropy", 0.05), **options)
+
+
+def feed(session, *pictures):
+    return [event for number, picture in enumerate(pictures) for event in session.take(Frame(float(number), picture))]
+
+
+def test_frames_become_looks_and_an_empty_table_ends_the_trial():
+    session = begin(learns=True)
+    events = feed(session, cube_picture(FACES, np.eye(3)), cube_picture(FACES, LEFT), BLANK)
+    assert [type(event) for event in events] == [Looked, Looked, Ended]
+    assert [event.turn for event in events[:2]] == [(), ("left",)]
+    assert events[1].step.detection == (2, 4)
+    assert events[1].step.pattern == session.memory.assumptions.alphabet.index((2, 4))
+    assert events[2].learned == "object-000"
+    assert session.trial is None
+
+
+def test_a_trial_is_learned_from_only_if_that_is_wanted():
+    session = begin()
+    (_, ended) = feed(session, cube_picture(FACES, np.eye(3)), BLANK)
+    assert ended.learned is None
+    assert len(session.memory) == 0
+    session.learn = True
+    (_, ended) = feed(session, cube_picture(FACES, np.eye(3)), BLANK)
+    assert ended.learned == "object-000"
+    assert not session.learn
+
+
+def test_a_turn_that_is_not_known_is_asked_for_and_the_answer_counts():
+    session = begin(asks=True)
+    events = feed(session, cube_picture(FACES, np.eye(3)), cube_picture(FACES, LEFT @ FLIP))
+    assert isinstance(events[-1], Asked)
+    (looked,) = session.answer(["flip", "left"])
+    assert looked.turn == ("flip", "left")
+    assert looked.step.detection == (2, 1)
+    assert session.trial.record.actions[:2] == [0, 1]
+
+
+def test_the_answer_that_it_is_another_cube_begins_another_trial():
+    session = begin(asks=True)
+    feed(session, cube_picture(FACES, np.eye(3)), cube_picture((6, 7, 8, 9, 10, 11), np.eye(3)))
+    assert [type(event) for event in session.answer(None)] == [Noted, Ended, Looked]
+
+
+def test_answers_that_nobody_asked_for_and_actions_that_there_are_not_are_refused():
+    session = begin(asks=True)
+    with pytest.raises(InvalidInputError, match="answer: nothing was asked"):
+        list(session.answer(["flip"]))
+    feed(session, cube_picture(FACES, np.eye(3)), cube_picture(FACES, LEFT @ FLIP))
+    with pytest.raises(InvalidInputError, match="action: 'jump'; expected one of: flip, left, right"):
+        list(session.answer(["jump"]))
+
+
+def test_another_cube_may_be_said_to_be_one():
+    session = begin()
+    feed(session, cube_picture(FACES, np.eye(3)))
+    assert [type(event) for event in session.begin_anew()] == [Ended]
+    (looked,) = feed(session, cube_picture(FACES, np.eye(3)))
+    assert looked.turn == ()
+
+
+def test_oddities_are_noted_once():
+    session = begin()
+    twice = cube_picture((0, 1, 2, 3, 0, 5), np.eye(3))
+    strangers = cube_picture((20, 21, 22, 23, 24, 25), np.eye(3))
+    events = feed(session, twice, twice, strangers, strangers)
+    assert [event.text for event in events if isinstance(event, Noted)] == [
+        "tag 0 is in view twice: it is not believed",
+        "tags 20, 24 are none of the tags that count",
+    ]
+    assert not any(isinstance(event, Looked) for event in events)
+
+
+def test_the_picture_has_the_tags_drawn_in():
+    session = begin()
+    assert session.picture is None
+    shown = cube_picture(FACES, np.eye(3))
+    feed(session, shown)
+    assert (session.picture != shown).any()
+
+
+@pytest.mark.parametrize(
+    ("assumptions", "message"),
+    [
+        (Assumptions(9, 24, ("flip", "left"), arcube_assumptions().alphabet), "memory: actions"),
+        (Assumptions(9, 24, ("flip", "left", "right"), PatternAlphabet(("front", "top"), 8)), "number of symbols 8"),
+        (Assumptions(9, 24, ("flip", "left", "right"), PatternAlphabet(("a", "b"), 12)), "memory: slots"),
+    ],
+)
+def test_a_memory_of_other_things_is_refused(assumptions, message):
+    with pytest.raises(InvalidInputError, match=message):
+        begin(RobotMemory(assumptions))
