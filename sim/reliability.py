@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import multiprocessing
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import closing, contextmanager
+from collections.abc import Callable, Iterable, Sequence
+from contextlib import closing
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -17,6 +15,7 @@ import numpy as np
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import MISSING, FloatArray
 from atg_fg.core.statistics import wilson_interval
+from atg_fg.experiments.executors.base import run_pieces
 from atg_fg.worlds.arcube import ACTION_SOURCES
 from sim.bodies.prepared_robot import PreparedRobot
 from sim.manipulation.preparation import prepared
@@ -115,31 +114,21 @@ def run_actions(
     runs: list[Run] = []
     left = n_actions
     spawner = np.random.SeedSequence(seed)
-    with _mapping(jobs) as run_all:
-        while left > 0:
-            lengths = [ACTIONS_A_TRIAL] * (left // ACTIONS_A_TRIAL)
-            lengths += [left % ACTIONS_A_TRIAL] if left % ACTIONS_A_TRIAL else []
-            for run in run_all(partial(_run_trial, condition, robot, n_stations), lengths, spawner.spawn(len(lengths))):
-                runs.append(run)
-                left -= len(run.actions)
-                if on_trial is not None:
-                    on_trial()
+    run_one = partial(_run_trial, condition, robot, n_stations)
+    while left > 0:
+        lengths = [ACTIONS_A_TRIAL] * (left // ACTIONS_A_TRIAL)
+        lengths += [left % ACTIONS_A_TRIAL] if left % ACTIONS_A_TRIAL else []
+        pieces = list(zip(lengths, spawner.spawn(len(lengths)), strict=True))
+        done = run_pieces(run_one, pieces, jobs=jobs, on_result=None if on_trial is None else lambda *_: on_trial())
+        runs += done
+        left -= sum(len(run.actions) for run in done)
     return runs
 
 
-@contextmanager
-def _mapping(jobs: int) -> Iterator[Callable[..., Iterator[Run]]]:
-    """Give what runs trials and returns their runs in order: here, or in a pool of spawned processes."""
-    if jobs == 1:
-        yield map
-        return
-    with ProcessPoolExecutor(jobs, mp_context=multiprocessing.get_context("spawn")) as pool:
-        yield pool.map
-
-
 def _run_trial(
-    condition: str, robot: PreparedRobot | None, n_stations: int, n_actions: int, seed: np.random.SeedSequence
+    condition: str, robot: PreparedRobot | None, n_stations: int, piece: tuple[int, np.random.SeedSequence]
 ) -> Run:
+    n_actions, seed = piece
     rng = np.random.default_rng(seed)
     with closing(_world(condition, robot, n_stations)) as world:
         begun = time.perf_counter()

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import sys
 from importlib.metadata import entry_points
+from io import TextIOWrapper
 from typing import Annotated, Any, Final
 
 import typer
@@ -55,6 +58,9 @@ OFFERED: Final = {"report": "Your data", "bench": "Engines", "sim": "Simulation"
 #: Commands of earlier versions, and what they are called now.
 MOVED: Final = {"compare": "engines compare", "calibrate": "engines check", "structure": "memory structure"}
 
+#: A pipe whose reader has gone, a disk that is full or faulty, a file that may not grow.
+_OUTPUT_ERRORS: Final = (errno.EPIPE, errno.ENOSPC, errno.EIO, errno.EFBIG, errno.EDQUOT)
+
 
 class _Commands(LazyGroup):
     """The commands of this package, and those of packages beside it."""
@@ -103,17 +109,35 @@ def _common(
 
 def main() -> None:
     """Run the command line and leave with its exit status."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # for terminals, and file names, of other encodings
     try:
         status = app(standalone_mode=False)
+        sys.stdout.flush()
     except (AtgError, typer.exceptions.TyperException) as error:
         sys.exit(_fail(error))
     except (typer.Abort, KeyboardInterrupt):
         sys.exit(130)
-    except BrokenPipeError:
-        # The reader of a pipe has gone; nothing is wrong here.
-        sys.stderr.close()
-        sys.exit(141)
+    except (OSError, SystemExit) as error:
+        sys.exit(_left_by_output(error))
     sys.exit(status if isinstance(status, int) else 0)
+
+
+def _left_by_output(error: OSError | SystemExit) -> int:
+    """Return the exit status where standard output cannot be written to; raise any other error again.
+
+    Errors of files have been made ``AtgError`` where they came up, or name the file.
+    """
+    # Rich leaves by SystemExit where the reader of a pipe has gone.
+    cause = error.__context__ if isinstance(error, SystemExit) else error
+    if not isinstance(cause, OSError) or cause.errno not in _OUTPUT_ERRORS or cause.filename is not None:
+        raise error
+    # What could not be written is not tried once more when Python leaves.
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    if isinstance(cause, BrokenPipeError):
+        return 141  # as of a program that this ends; nothing is wrong here
+    return _fail(InvalidInputError(f"standard output: {cause.strerror}"))
 
 
 def _fail(error: Exception) -> int:

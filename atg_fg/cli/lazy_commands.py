@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import ast
+import signal
+import threading
 from collections.abc import Callable
 from importlib import import_module
 from importlib.abc import InspectLoader
@@ -41,8 +43,11 @@ class LazyCommand(TyperCommand):
         self.help = _help_in_source(self._module, self._attribute) or self.load().help
 
     def make_context(self, *arguments: Any, **options: Any) -> Any:
-        """Hand over to the command itself."""
-        return self.load().make_context(*arguments, **options)
+        """Hand over to the command itself; from now on Ctrl-C is ``KeyboardInterrupt`` to it."""
+        command = self.load()
+        if callable(signal.getsignal(signal.SIGINT)) and threading.current_thread() is threading.main_thread():
+            signal.signal(signal.SIGINT, signal.default_int_handler)
+        return command.make_context(*arguments, **options)
 
 
 class LazyGroup(TyperGroup):

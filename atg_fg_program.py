@@ -1,0 +1,19 @@
+"""The program ``atg-fg``: Ctrl-C ends it from its first moment on, also while libraries are loaded."""
+
+import os
+import signal
+from types import FrameType
+
+
+def _leave(signal_number: int, frame: FrameType | None) -> None:
+    # No exception: libraries that are being loaded turn it into errors of their own.
+    os._exit(130)
+
+
+def main() -> None:
+    """Run the command line; when a command has been loaded, Ctrl-C is an exception to it (``LazyCommand``)."""
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:  # not where a shell said to ignore it
+        signal.signal(signal.SIGINT, _leave)
+    from atg_fg.cli import main as run
+
+    run()
