@@ -114,6 +114,10 @@ class Score:
             largest.get(presented) == name for name, presented in zip(owners, self._learned_from, strict=True)
         )
 
+    def name_of(self, presented: object) -> str | None:
+        """Return the name of the first ATG that was made from an object, ``None`` if there is none."""
+        return next((name for name, made_from in self._made_from.items() if made_from == presented), None)
+
     def has_met(self, presented: object) -> bool:
         """Whether an object was presented in a trial before."""
         return presented in self._presented

@@ -18,7 +18,8 @@ def report(
         Path,
         typer.Argument(
             help="A trial's record (.jsonl), the trials of a test (.jsonl.gz), a run of the goal experiment "
-            "(.json.gz), a robot memory database (.db) or the result of an experiment (.json).",
+            "(.json.gz), a robot memory with its trials (.db) or without (.json, .npz), or the result of an "
+            "experiment (.json).",
             show_default=False,
         ),
     ],
@@ -29,7 +30,7 @@ def report(
         Path | None, typer.Option(help="Memory that the trial began with, for the ATGs of what it remembered.")
     ] = None,
 ) -> None:
-    """Make one HTML page of a trial, to be looked at step by step, or of an experiment's tables and plots.
+    """Make one HTML page: a trial, to be looked at step by step, a memory's ATGs, or an experiment's tables and plots.
 
     The page needs no network and no other file.
 

@@ -29,6 +29,8 @@ class Look:
         slipped: Whether the action before this look failed, by the truth.
         graph: Index, in the trial's graphs, of the ATG of what the robot would judge the object to be.
         frame: The camera frame as a ``data:`` address, if there is one.
+        verdict_entropy: Of the verdict in nats: *unseen* is one state of it, however many objects were never met; as
+            ``entropy`` where it is not known how many.
     """
 
     seen: Detection
@@ -42,6 +44,7 @@ class Look:
     slipped: bool = False
     graph: int = 0
     frame: str | None = None
+    verdict_entropy: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -146,6 +149,7 @@ class Report:
         notes: Sentences on what the file does not hold, or how something was come by.
         assumptions: Of the trials.
         trials: The trials, if the file is of trials.
+        gallery: The ATGs, if the file is a memory.
         tables: Of an experiment.
         plots: Of an experiment.
     """
@@ -155,6 +159,7 @@ class Report:
     notes: tuple[str, ...] = ()
     assumptions: Assumptions | None = None
     trials: tuple[TrialPage, ...] = ()
+    gallery: tuple[PlacedGraph, ...] = ()
     tables: tuple[Table, ...] = ()
     plots: tuple[Plot, ...] = ()
 
@@ -167,6 +172,7 @@ class Report:
             "actions": list(self.assumptions.actions),
             "n_aspects": self.assumptions.n_aspects,
             "trials": [asdict(trial) for trial in self.trials],
+            **({"gallery": [asdict(graph) for graph in self.gallery]} if self.gallery else {}),
         }
 
 

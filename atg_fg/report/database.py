@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+import contextlib
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from atg_fg.core.assumptions import Assumptions, arcube_assumptions
-from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.errors import AtgError, InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.records import Experiment, TrialSummary
 from atg_fg.report.content import Report, TrialPage, shown_parameters
-from atg_fg.report.graphs import TrialGraphs
+from atg_fg.report.graphs import TrialGraphs, gallery
 from atg_fg.report.summaries import looks_of, told_truth, told_verdict
-from atg_fg.report.test_log import test_report
+from atg_fg.report.test_log import Retelling, test_report
 from atg_fg.storage.database.memory_reading import database_holds_memory
 from atg_fg.storage.database.trial_log import TEST_KIND, read_stored_experiments, read_stored_trials
 from atg_fg.storage.memory_files import load_memory
+from atg_fg.storage.presets import PRESETS
 from atg_fg.storage.recorded_test import read_header, stored_test
 from atg_fg.worlds.registry import WORLDS
 
@@ -27,19 +30,21 @@ _NOTE: Final = (
 
 
 def read_database(path: Path, memory: RobotMemory | None) -> Report:
-    """Return the page of all trials in a database.
+    """Return the page of all trials in a database, or of the ATGs of its memory if there are no trials.
 
     Args:
         path: The database.
         memory: Says what was taken for granted, where the database holds no memory and a test's world is a user's own.
 
     Raises:
-        InvalidInputError: It cannot be read, holds no trial, or anything in it is not as it should be.
+        InvalidInputError: It cannot be read, or anything in it is not as it should be.
     """
-    if memory is None and database_holds_memory(path):
-        memory = load_memory(path)
+    held = load_memory(path) if database_holds_memory(path) else None
+    taught = _Taught(path, memory or held)
     experiments: list[Experiment | None] = [*read_stored_experiments(path), None]
-    reports = [report for each in experiments if (report := _experiment_report(each, memory, path)) is not None]
+    reports = [report for each in experiments if (report := taught.report(each)) is not None]
+    if not reports and held is not None and len(held):
+        return gallery(held, path.name)
     if not reports:
         raise InvalidInputError(f"{path}: no trials; expected at least one")
     return reports[0] if len(reports) == 1 else _joined(reports, path)
@@ -60,41 +65,73 @@ def _joined(reports: list[Report], path: Path) -> Report:
     return Report(title, shown_parameters({"file": path.name}), notes, assumptions, tuple(trials))
 
 
-def _experiment_report(experiment: Experiment | None, memory: RobotMemory | None, path: Path) -> Report | None:
-    """Return the page of an experiment, or of the trials that belong to none; ``None`` if there are no trials."""
-    stated = None if memory is None else memory.assumptions
-    if experiment is not None and experiment.kind == TEST_KIND:
-        test = stored_test(path, experiment, stated)
-        return test_report(test) if test.trials else None
-    assumptions = stated or arcube_assumptions()
-    if experiment is None:
-        trials = list(read_stored_trials(path, assumptions=assumptions, alone=True))
-    else:
+class _Taught:
+    """The experiments of a database, one after the other.
+
+    What a memory was taught since it was empty is inferred again, as for a test. Where it was not empty at first, or
+    has learned something else besides, the ATGs are those of today.
+
+    Args:
+        path: The database.
+        memory: Of today.
+    """
+
+    def __init__(self, path: Path, memory: RobotMemory | None) -> None:
+        self._path, self._memory = path, memory
+        self._retelling: Retelling | None = None
+        # How many ATGs the memory had before the first trial: it has those of today, but for what it was taught since.
+        taught = sum(trial.verdict == "novel" and trial.learned is not None for trial in read_stored_trials(path))
+        self._n_remembered = 0 if memory is None else max(len(memory) + len(memory.merges) - taught, 0)
+
+    def report(self, experiment: Experiment | None) -> Report | None:
+        """Return the page of an experiment, or of the trials that belong to none; ``None`` if there are no trials."""
+        stated = None if self._memory is None else self._memory.assumptions
+        if experiment is not None and experiment.kind == TEST_KIND:
+            test = stored_test(self._path, experiment, stated)
+            return test_report(test) if test.trials else None
+        assumptions, about = stated or arcube_assumptions(), {} if experiment is None else experiment.parameters
         # The memory that is there now may be of another world than the one that the trials were run in.
-        if experiment.parameters.get("world") in list(WORLDS):
-            assumptions = (
-                read_header(experiment.parameters, f"{path}: experiment {experiment.number}")[1] or assumptions
-            )
-        trials = list(read_stored_trials(path, experiment.number, assumptions))
-    if not trials:
-        return None
-    if memory is not None and replace(assumptions, n_objects=memory.assumptions.n_objects) != memory.assumptions:
-        memory = None
-    pages = [_page(trial, memory, assumptions) for trial in trials]
-    kind = "trial" if experiment is None else experiment.kind
-    parameters = {} if experiment is None else {"seed": experiment.seed, **experiment.parameters}
-    title = f"{kind}, {len(pages)} of them" if len(pages) > 1 else f"A {kind}, look by look"
-    return Report(title, shown_parameters(parameters), (_NOTE,), assumptions, tuple(pages))
+        if experiment is not None and about.get("world") in list(WORLDS):
+            assumptions = read_header(about, f"{self._path}: experiment {experiment.number}")[1] or assumptions
+        number = None if experiment is None else experiment.number
+        trials = list(read_stored_trials(self._path, number, assumptions, alone=experiment is None))
+        if not trials:
+            return None
+        pages = []
+        for trial in trials:
+            pages.append(self._page(trial, about, assumptions))
+            self._n_remembered += trial.verdict == "novel" and trial.learned is not None
+        kind = "trial" if experiment is None else experiment.kind
+        parameters = {} if experiment is None else {"seed": experiment.seed, **about}
+        title = f"{kind}, {len(pages)} of them" if len(pages) > 1 else f"A {kind}, look by look"
+        notes = () if self._retelling is not None and self._retelling.inferred else (_NOTE,)
+        return Report(title, shown_parameters(parameters), notes, assumptions, tuple(pages))
 
+    def _page(self, trial: TrialSummary, about: Mapping[str, Any], assumptions: Assumptions) -> TrialPage:
+        if self._retelling is None:
+            self._retelling = Retelling(assumptions, inferred=True)
+        told, name = self._retelling, about.get("preset")
+        parameters = PRESETS[name] if isinstance(name, str) and name in PRESETS else None
+        told.inferred = told.inferred and parameters is not None and not parameters.learn_structure
+        if told.inferred and parameters is not None:
+            with contextlib.suppress(AtgError):  # what this memory did not lead to
+                page = told.page(trial, f"trial {trial.number}", parameters, by_entropy=False)
+                if told.inferred:
+                    return page
+            told.inferred = False
+        return self._page_of_today(trial, assumptions)
 
-def _page(trial: TrialSummary, memory: RobotMemory | None, assumptions: Assumptions) -> TrialPage:
-    graphs = TrialGraphs(memory, assumptions, trial.detections, trial.actions)
-    index = graphs.index_of(trial.learned)
-    return TrialPage(
-        title=f"trial {trial.number}",
-        verdict=told_verdict(trial.verdict, trial.matched),
-        truth=told_truth(trial.truths[-1]),
-        right=None,
-        looks=tuple(replace(look, graph=index) for look in looks_of(trial)),
-        graphs=graphs.graphs,
-    )
+    def _page_of_today(self, trial: TrialSummary, assumptions: Assumptions) -> TrialPage:
+        memory, n_unseen = self._memory, max(assumptions.n_objects - self._n_remembered, 1)
+        if memory is not None and replace(assumptions, n_objects=memory.assumptions.n_objects) != memory.assumptions:
+            memory = None
+        graphs = TrialGraphs(memory, assumptions, trial.detections, trial.actions)
+        index = graphs.index_of(trial.learned)
+        return TrialPage(
+            title=f"trial {trial.number}",
+            verdict=told_verdict(trial.verdict, trial.matched),
+            truth=told_truth(trial.truths[-1]),
+            right=None,
+            looks=tuple(replace(look, graph=index) for look in looks_of(trial, n_unseen)),
+            graphs=graphs.graphs,
+        )

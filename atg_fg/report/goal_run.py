@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from atg_fg.core.assumptions import Assumptions, arcube_assumptions
-from atg_fg.core.checks import one_of
+from atg_fg.core.assumptions import MAX_NUMBER, Assumptions, arcube_assumptions
+from atg_fg.core.checks import one_of, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.report.content import Report, TrialPage, shown_parameters
@@ -48,8 +48,15 @@ def read_goal_run(path: Path, memory: RobotMemory | None) -> Report:
     if not served:
         raise InvalidInputError(f"{path}: served: no goals; expected at least one")
     assumptions = arcube_assumptions() if memory is None else memory.assumptions
+    # As many as GoalPlan has where the run's header does not say otherwise.
+    n_objects, n_remembered = (
+        whole_number(document.get(name, usual), f"{path}: {name}", 1, MAX_NUMBER)
+        for name, usual in (("n_objects", 100), ("n_remembered", 20))
+    )
+    n_unseen = max(n_objects - n_remembered, 1)
     pages = [
-        _page(entry, number, memory, assumptions, f"{path}: served[{number}]") for number, entry in enumerate(served)
+        _page(entry, number, n_unseen, memory, assumptions, f"{path}: served[{number}]")
+        for number, entry in enumerate(served)
     ]
     header = {key: value for key, value in document.items() if key not in ("format", "version")}
     reached = sum(entry["ending"] == "reached" for entry in served)
@@ -58,8 +65,10 @@ def read_goal_run(path: Path, memory: RobotMemory | None) -> Report:
     return Report(title, shown_parameters(header), notes, assumptions, tuple(pages))
 
 
-def _page(entry: Any, number: int, memory: RobotMemory | None, assumptions: Assumptions, place: str) -> TrialPage:
-    """Return what came of one goal."""
+def _page(
+    entry: Any, number: int, n_unseen: int, memory: RobotMemory | None, assumptions: Assumptions, place: str
+) -> TrialPage:
+    """Return what came of one goal; ``n_unseen`` objects were never met."""
     read_object(entry, place, ("ending", "goal", "trial"), optional=tuple(entry) if isinstance(entry, dict) else ())
     ending = one_of(entry["ending"], f"{place}: ending", _ENDINGS)
     goal = assumptions.alphabet.check_detection(read_list(entry["goal"], f"{place}: goal"), f"{place}: goal")
@@ -73,7 +82,7 @@ def _page(entry: Any, number: int, memory: RobotMemory | None, assumptions: Assu
         graphs=(),
         goal=goal,
     )
-    return with_graphs(page, looks_of(trial), memory, assumptions, trial.matched)
+    return with_graphs(page, looks_of(trial, n_unseen), memory, assumptions, trial.matched)
 
 
 def _is_right(entry: Mapping[str, Any], ending: str) -> bool:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import itertools
 import math
 from collections.abc import Sequence
 
 from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.assumptions import Assumptions
+from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.patterns import Detection, Evidence
-from atg_fg.report.content import PlacedGraph
+from atg_fg.report.content import PlacedGraph, Report
 
+#: ATGs that a gallery shows.
+MOST_DRAWN = 200
 #: What the graph of an object is called that no ATG is remembered of.
 NEW_OBJECT = "a new object"
 UNKNOWN_MEMORY = "what the trial has shown"
@@ -55,8 +59,31 @@ class TrialGraphs:
             before, title = self._memory[name], name
         after = before.copy()
         after.learn(self._patterns, self._actions)
-        edges = tuple((*edge, count) for edge, count in sorted(before.counts.items()))
-        return PlacedGraph(title, before.n_known, after.aspects, _circle(after.n_known), edges)
+        return _remembered(before, title, after)
+
+
+def gallery(memory: RobotMemory, name: str) -> Report:
+    """Return the page of the ATGs of a memory, the first ones of very many.
+
+    Args:
+        memory: The memory.
+        name: Of its file.
+
+    Raises:
+        InvalidInputError: It is empty.
+    """
+    if not len(memory):
+        raise InvalidInputError(f"{name}: no objects; expected at least one")
+    drawn = tuple(_remembered(graph, graph.name, graph) for graph in itertools.islice(memory, MOST_DRAWN))
+    notes = () if len(memory) <= MOST_DRAWN else (f"The first {MOST_DRAWN} of {len(memory)} objects are drawn.",)
+    title = f"{len(memory)} of {memory.assumptions.n_objects} objects"
+    return Report(title, {"file": name}, notes, memory.assumptions, gallery=drawn)
+
+
+def _remembered(before: AspectTransitionGraph, title: str, after: AspectTransitionGraph) -> PlacedGraph:
+    """Return an ATG placed for drawing, with room for the aspects that it has ``after`` a trial."""
+    edges = tuple((*edge, count) for edge, count in sorted(before.counts.items()))
+    return PlacedGraph(title, before.n_known, after.aspects, _circle(after.n_known), edges)
 
 
 def _circle(n_aspects: int) -> tuple[tuple[float, float], ...]:

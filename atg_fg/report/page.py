@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 
 #: In the order in which they are run.
 _SCRIPTS: Final = ("elements.js", "aspect.js", "graph.js", "entropy.js", "trial.js")
+_GALLERY_SCRIPTS: Final = ("elements.js", "aspect.js", "graph.js", "gallery.js")
 
 
 def write_report(report: Report, path: Path) -> None:
@@ -37,7 +38,8 @@ def page(report: Report) -> str:
         MissingDependencyError: Jinja2 is not installed.
     """
     template = environment().get_template("page.html")
-    scripts = [_packaged(name) for name in _SCRIPTS] if report.trials else []
+    names = _SCRIPTS if report.trials else _GALLERY_SCRIPTS if report.gallery else ()
+    scripts = [_packaged(name) for name in names]
     return template.render(
         report=report,
         data=report.trial_data(),

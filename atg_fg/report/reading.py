@@ -14,10 +14,14 @@ from atg_fg.report.content import Report
 from atg_fg.report.database import read_database
 from atg_fg.report.experiments import EXPERIMENTS, read_experiment
 from atg_fg.report.goal_run import GOAL_RUN_FORMAT, read_goal_run
+from atg_fg.report.graphs import gallery
 from atg_fg.report.test_log import test_report
 from atg_fg.report.trial_record import read_trial_record
 from atg_fg.storage.checked_json import parse_json
+from atg_fg.storage.compact_file import is_compact
 from atg_fg.storage.database.connection import is_database
+from atg_fg.storage.memory_files import load_memory
+from atg_fg.storage.memory_json import MEMORY_FORMAT, memory_from_document
 from atg_fg.storage.plain_files import read_text_file, readable_again
 from atg_fg.storage.recorded_test import recorded_tests
 from atg_fg.storage.trial_record import TRIAL_FORMAT
@@ -25,7 +29,7 @@ from atg_fg.storage.trial_record import TRIAL_FORMAT
 _GZIP: Final = b"\x1f\x8b"
 _EXPECTED: Final = (
     "expected a trial's record (trial --record), the trials of a test (table1 --records), a run (goal --records), "
-    "the trials in a robot memory database, "
+    "a robot memory with its trials if it is a database, "
     f"or a result (--json) of: {', '.join(EXPERIMENTS)}"
 )
 
@@ -59,12 +63,16 @@ def _report_of(path: Path, memory: RobotMemory | None) -> Report:
             return read_goal_run(path, memory)
         (test,) = recorded_tests(path, None if memory is None else memory.assumptions)
         return test_report(test)
+    if is_compact(path):
+        return gallery(load_memory(path), path.name)
     text = read_text_file(path)
     if _first_line(text).get("format") == TRIAL_FORMAT:
         return read_trial_record(text, path, memory)
     document = parse_json(text, str(path))
     if isinstance(document, dict) and document.get("command") in list(EXPERIMENTS):
         return read_experiment(document, str(path))
+    if isinstance(document, dict) and document.get("format") == MEMORY_FORMAT:
+        return gallery(memory_from_document(document, str(path)), path.name)
     raise InvalidInputError(f"{path}: {_what_it_says(document)}; {_EXPECTED}")
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -13,8 +14,15 @@ from atg_fg.report.content import Look, TrialPage
 from atg_fg.report.graphs import TrialGraphs
 
 
-def look_of(step: StepSummary) -> Look:
-    """Return a look as a page shows it."""
+def look_of(step: StepSummary, n_unseen: int | None) -> Look:
+    """Return a look as a page shows it.
+
+    Args:
+        step: What is kept of it.
+        n_unseen: How many objects were never met, ``None`` if that is not known.
+    """
+    # All of them are alike to the robot, so that which one it is adds the logarithm of their number.
+    of_unseen = 0.0 if n_unseen is None else step.unseen * math.log(n_unseen)
     return Look(
         step.observed,
         step.unseen,
@@ -24,12 +32,13 @@ def look_of(step: StepSummary) -> Look:
         purpose=step.purpose,
         shown=_shown(step.truth),
         slipped=bool(step.truth.get("slipped")),
+        verdict_entropy=max(step.entropy - of_unseen, 0.0),
     )
 
 
-def looks_of(trial: TrialSummary) -> list[Look]:
-    """Return the looks of a trial."""
-    return [look_of(step) for step in trial.steps]
+def looks_of(trial: TrialSummary, n_unseen: int | None) -> list[Look]:
+    """Return the looks of a trial; ``n_unseen`` is as for ``look_of``."""
+    return [look_of(step, n_unseen) for step in trial.steps]
 
 
 def _shown(truth: Mapping[str, Any]) -> tuple[int, ...] | None:
@@ -40,11 +49,13 @@ def _shown(truth: Mapping[str, Any]) -> tuple[int, ...] | None:
     return None
 
 
-def told_truth(truth: Mapping[str, Any]) -> str:
-    """Return in words what was presented, by a world's truth."""
+def told_truth(truth: Mapping[str, Any], name: str | None = None) -> str:
+    """Return in words what was presented, by a world's truth; ``name`` is of the ATG that was made from it, if any."""
     if "object" not in truth:
         return "not recorded"
-    return f"object number {truth['object']}" + (", lost" if truth.get("lost") else "")
+    presented = truth["object"]
+    told = f"object number {presented}" if isinstance(presented, int) else str(presented)
+    return (told if name is None else f"{name} ({told})") + (", lost" if truth.get("lost") else "")
 
 
 def told_verdict(verdict: str, matched: object) -> str:

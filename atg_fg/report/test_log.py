@@ -10,8 +10,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Final
 
+from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence
 from atg_fg.core.records import TrialSummary
 from atg_fg.engines import begin_trial
@@ -40,39 +42,60 @@ def test_report(test: RecordedTest) -> Report:
     """
     if not test.trials:
         raise InvalidInputError(f"{test.place}: no trials; expected at least one")
-    told = _Test(test)
-    pages = [told.page(trial, number) for number, trial in enumerate(test.trials)]
+    # Structure that is learned, and merges, take their time; such a memory does not follow from the log alone.
+    merging = bool(test.header.get("merge_duplicates"))
+    told = Retelling(test.assumptions, inferred=not (test.parameters.learn_structure or merging), merging=merging)
+    by_entropy = test.header.get("policy", EntropyPolicy.name) == EntropyPolicy.name
+    pages = []
+    for number, trial in enumerate(test.trials):
+        with placed(f"{test.place}: trial {number}"):
+            pages.append(told.page(trial, f"trial {number}", test.parameters, by_entropy=by_entropy))
     title = f"A test of {len(pages)} trials, {told.score.successes} of them right"
     notes = () if told.inferred else (_NOT_INFERRED,)
     return Report(title, shown_parameters(test.header), notes, test.assumptions, tuple(pages))
 
 
-class _Test:
-    """The robot's memory and the score, trial after trial."""
+class Retelling:
+    """The robot's memory, which was empty at first, and the score, trial after trial.
 
-    def __init__(self, test: RecordedTest) -> None:
-        self._test = test
-        self._assumptions = test.assumptions
-        self._memory = RobotMemory(test.assumptions)
+    Args:
+        assumptions: Of all trials.
+        inferred: Whether beliefs are inferred again; no longer, once they do not agree with what was recorded.
+        merging: Whether the robot merged ATGs, so that it is not known how many it had.
+    """
+
+    def __init__(self, assumptions: Assumptions, *, inferred: bool, merging: bool = False) -> None:
+        self._assumptions, self._merging = assumptions, merging
+        self._memory = RobotMemory(assumptions)
         self.score = Score()
-        # Structure that is learned, and merges, take their time; such a memory does not follow from the log alone.
-        self.inferred = not (test.parameters.learn_structure or test.header.get("merge_duplicates"))
+        self.inferred = inferred
 
-    def page(self, trial: TrialSummary, number: int) -> TrialPage:
-        """Return the page of the next trial, and learn from it."""
-        looks = looks_of(trial)
+    def page(self, trial: TrialSummary, title: str, parameters: ModelParameters, *, by_entropy: bool) -> TrialPage:
+        """Return the page of the next trial, and learn from it.
+
+        Args:
+            trial: What was recorded.
+            title: Of the page.
+            parameters: Of the model that judged it.
+            by_entropy: Whether the policy looked at expected entropies.
+
+        Raises:
+            InvalidInputError: The trial does not follow from those before it.
+        """
+        looks = looks_of(trial, None if self._merging else self._memory.n_unseen)
         if self.inferred:
-            looks = self._with_beliefs(looks)
+            looks = self._with_beliefs(looks, parameters, by_entropy=by_entropy)
         met = "met before" if self.score.has_met(trial.object) else "never met before"
-        truth = f"{told_truth(trial.truths[-1])}, {met}"
-        page = TrialPage(f"trial {number}", told_verdict(trial.verdict, trial.matched), truth, None, (), ())
+        truth = f"{told_truth(trial.truths[-1], self.score.name_of(trial.object))}, {met}"
+        page = TrialPage(title, told_verdict(trial.verdict, trial.matched), truth, None, (), ())
         page = with_graphs(page, looks, self._memory if self.inferred else None, self._assumptions, trial.matched)
-        return replace(page, right=self._learn(trial, f"{self._test.place}: trial {number}"))
+        before = self.score.successes
+        self.score.add(trial, learn_from(trial, self._memory))
+        return replace(page, right=self.score.successes > before)
 
-    def _with_beliefs(self, looks: list[Look]) -> list[Look]:
+    def _with_beliefs(self, looks: list[Look], parameters: ModelParameters, *, by_entropy: bool) -> list[Look]:
         """Return the looks with the belief over objects, if the memory leads to what was recorded."""
-        inference = begin_trial("bayes-filter", self._memory, self._test.parameters)
-        by_entropy = self._test.header.get("policy", EntropyPolicy.name) == EntropyPolicy.name
+        inference = begin_trial("bayes-filter", self._memory, parameters)
         found = []
         for look in looks:
             inference.observe(Evidence.of_detection(self._assumptions.alphabet, look.seen))
@@ -80,8 +103,8 @@ class _Test:
             if max(abs(belief.unseen - look.unseen), abs(belief.entropy - look.entropy)) > _TOLERANCE:
                 self.inferred = False
                 return looks
-            expected: tuple[tuple[str, float], ...] = ()
-            if look.action is not None and by_entropy:
+            expected = look.expected
+            if look.action is not None and by_entropy and not expected:
                 values = inference.expected_entropies().tolist()
                 expected = tuple(zip(self._assumptions.actions, values, strict=True))
             objects = best_objects(self._memory.names, belief.objects.tolist())
@@ -89,10 +112,3 @@ class _Test:
             if look.action is not None:
                 inference.act(self._assumptions.action_index(look.action))
         return found
-
-    def _learn(self, trial: TrialSummary, place: str) -> bool:
-        """Let the memory learn from a trial; return whether its verdict was right."""
-        before = self.score.successes
-        with placed(place):
-            self.score.add(trial, learn_from(trial, self._memory))
-        return self.score.successes > before

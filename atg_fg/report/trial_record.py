@@ -70,7 +70,8 @@ def read_trial_record(text: str, path: Path, memory: RobotMemory | None) -> Repo
         title="trial",
         verdict=told_verdict(trial.verdict, trial.matched),
         truth=told_truth(read_info(end["truth"], f"{place}: verdict: truth")),
-        right=None,
+        # From a memory with objects, the record does not say which of them this one is by the truth.
+        right=None if names else trial.verdict == "novel",
         looks=(),
         graphs=(),
     )
@@ -107,7 +108,9 @@ def _look(step: Any, names: list[str], assumptions: Assumptions, folder: Path, p
     ]
     read = read_step(fields, place, assumptions)
     frame = data_address(fields["frame"], folder, f"{place}: frame") if "frame" in fields else None
-    return read, replace(look_of(read), objects=best_objects(names, shares), frame=frame)
+    return read, replace(
+        look_of(read, max(assumptions.n_objects - len(names), 1)), objects=best_objects(names, shares), frame=frame
+    )
 
 
 def _holding(value: Any, place: str, *keys: str) -> dict[str, Any]:

@@ -7,8 +7,10 @@ import pytest
 
 from atg_fg.report.page import write_report
 from atg_fg.report.reading import read_report
+from atg_fg.storage.memory_files import save_memory
 from tests.report.chromium import Page, need_chromium
 from tests.report.conftest import NASTY
+from tests.report.test_crafted import long_trial
 
 RESULTS = Path(__file__).parents[2] / "results"
 
@@ -104,6 +106,34 @@ def test_a_test_has_a_chooser_of_its_trials(test_log, opened):
     wrong = sum(trial.right is False for trial in report.trials)
     page.ask("document.getElementById('only-wrong').click()")
     assert page.ask("document.getElementById('trial').options.length") == (wrong or 12)
+
+
+def test_the_verdict_is_told_at_the_last_look_only(test_log, opened):
+    page = opened(test_log)
+    report = read_report(test_log)
+    number = next(n for n, trial in enumerate(report.trials) if trial.verdict.startswith("object-") and trial.right)
+    page.ask(f"drawTrial({number})")
+    told = "document.getElementById('verdict').textContent"
+    assert page.ask(told).startswith("so far")
+    page.ask(f"stepTo({len(report.trials[number].looks) - 1})")
+    assert page.ask(told).startswith(f"✓ rightThe robot says: {report.trials[number].verdict}. Truth: ")
+    offered = page.ask("[...document.getElementById('trial').options].map((each) => each.textContent)")
+    assert offered[number] == f"✓ trial {number}"
+
+
+def test_a_long_trial_is_drawn_with_few_dots(tmp_path, opened):
+    long_trial(5_000, tmp_path / "long.jsonl")
+    page = opened(tmp_path / "long.jsonl")
+    page.press("End")
+    assert shown(page) == "look 4999 of 4999"
+    assert 300 <= page.ask("document.querySelectorAll('#entropy .h-dot').length") <= 1_000
+
+
+def test_a_gallery_draws_every_graph(trial, tmp_path, opened):
+    save_memory(trial[0], tmp_path / "memory.json")
+    page = opened(tmp_path / "memory.json")
+    assert page.ask("document.querySelectorAll('#gallery svg').length") == 1
+    assert "object-000" in page.ask("document.getElementById('gallery').textContent")
 
 
 def test_every_look_of_a_goal_run_is_drawn(goal_run, opened):

@@ -3,6 +3,7 @@
 import contextlib
 import gzip
 import json
+import math
 import random
 from pathlib import Path
 
@@ -10,11 +11,12 @@ import pytest
 
 from atg_fg.core.assumptions import arcube_assumptions
 from atg_fg.core.errors import AtgError, InvalidInputError
+from atg_fg.core.memory import RobotMemory
 from atg_fg.experiments.table1 import TestPlan, run_test
 from atg_fg.experiments.trial import learn_from
 from atg_fg.report.experiments import EXPERIMENTS
 from atg_fg.report.reading import read_report
-from atg_fg.storage.memory_files import open_memory
+from atg_fg.storage.memory_files import open_memory, save_memory
 from atg_fg.storage.trial_log import read_log
 
 RESULTS = Path(__file__).parents[2] / "results"
@@ -76,7 +78,58 @@ def test_trials_that_a_database_was_taught_show_what_they_were_learned_into(tria
     assert [value for _, value in page.looks[0].expected] == run.steps[0].expected_entropies.tolist()
 
 
-def test_a_database_without_trials_is_refused(tmp_path):
+def test_a_memory_that_was_empty_at_first_is_retold_with_beliefs_and_what_was_right(run, tmp_path):
+    robot = tmp_path / "robot.db"
+    open_memory(robot, arcube_assumptions()).close()
+    about = ("--engine", "bayes-filter", "--preset", "default", "--actions", "6")
+    for seed in (1, 0, 1):
+        assert run("trial", "--memory", robot, "--save-memory", robot, "--seed", seed, *about)[0] == 0
+    first, second, third = read_report(robot).trials
+    assert [page.right for page in (first, second, third)] == [True, True, True]
+    assert (first.verdict, third.verdict) == ("a new object", "object-000")
+    assert third.truth == f"object-000 ({first.truth.split(',')[0]}), met before"
+    assert read_report(robot).notes == ()
+    for look in third.looks:
+        assert sum(share for _, share in look.objects) + look.unseen == pytest.approx(1.0, abs=1e-9)
+    assert third.looks[-1].objects[0][0] == "object-000"
+
+
+def test_a_new_object_has_the_entropy_of_the_verdict(trial, record, test_log):
+    memory, step = trial[0], trial[1].steps[0]
+    (page,) = read_report(record).trials
+    parts = [*step.belief.objects.tolist(), step.belief.unseen]  # never met is one state of the verdict
+    assert page.looks[0].verdict_entropy == pytest.approx(-sum(p * math.log(p) for p in parts if p), abs=1e-12)
+    assert len(memory) == 1
+    first, *others = read_report(test_log).trials
+    assert {look.verdict_entropy for look in first.looks} == {0.0}  # a robot that remembers nothing is sure
+    assert max(look.verdict_entropy for page in others for look in page.looks) > 0.1
+
+
+def test_whether_the_first_trial_of_all_is_right_can_be_told(tmp_path, run):
+    record = tmp_path / "trial.jsonl"
+    assert run("trial", "--engine", "bayes-filter", "--actions", "2", "--record", record)[0] == 0
+    (page,) = read_report(record).trials
+    assert (page.verdict, page.right) == ("a new object", True)
+
+
+@pytest.mark.parametrize("name", ["memory.json", "memory.npz", "memory.db"])
+def test_a_memory_is_a_gallery_of_its_graphs(trial, tmp_path, name):
+    save_memory(trial[0], tmp_path / name)
+    report = read_report(tmp_path / name)
+    (drawn,) = report.gallery
+    graph = trial[0]["object-000"]
+    assert (drawn.name, drawn.aspects, drawn.remembered) == (graph.name, graph.aspects, graph.n_known)
+    assert {edge[:3]: edge[3] for edge in drawn.edges} == graph.counts
+    assert report.trial_data()["gallery"][0]["name"] == "object-000"
+
+
+def test_an_empty_memory_is_no_gallery(tmp_path):
+    save_memory(RobotMemory(arcube_assumptions()), tmp_path / "memory.json")
+    with pytest.raises(InvalidInputError, match="no objects; expected at least one"):
+        read_report(tmp_path / "memory.json")
+
+
+def test_a_database_without_trials_or_objects_is_refused(tmp_path):
     open_memory(tmp_path / "robot.db", arcube_assumptions()).close()
     with pytest.raises(InvalidInputError, match="no trials; expected at least one"):
         read_report(tmp_path / "robot.db")
@@ -220,7 +273,8 @@ def test_another_memory_is_refused(trial, record):
         (b"", "not valid JSON"),
         (b"{", "not valid JSON"),
         (b"[1]", "says neither a command nor a format"),
-        (b'{"format": "atg-fg/memory"}', "is of 'atg-fg/memory'; expected a trial's record"),
+        (b'{"format": "atg-fg/memory"}', "key 'version' is missing"),
+        (b'{"format": "atg-fg/preset"}', "is of 'atg-fg/preset'; expected a trial's record"),
         (b'{"command": "table1"}', "expected a result that atg-fg table1 --json wrote"),
         (b'{"command": "figure3", "points": [{"actions": "x"}]}', "expected a result that atg-fg figure3"),
         (b"\xff\xfe", "not a UTF-8 text file"),

@@ -30,8 +30,8 @@ function beliefRows(look) {
 }
 
 function expectedRows(look) {
-  const most = Math.max(...look.expected.map(([, value]) => value), 1e-9);
-  return look.expected.map(([name, value]) => ({ name: name === look.action ? `${name} – chosen` : name, share: value / most,
+  const most = Math.max(...promised(look).map(([, value]) => value), 1e-9);
+  return promised(look).map(([name, value]) => ({ name: name === look.action ? `${name} – chosen` : name, share: value / most,
     value: value.toFixed(3), kind: name === look.action ? "lit" : "quiet", nameKind: name === look.action ? "best" : "" }));
 }
 
@@ -46,6 +46,16 @@ function seenWords(look) {
   return `${inWords(look.seen, data.slots)}.${shown}${slipped}`;
 }
 
+// What the robot takes the object for; only the last look is its verdict.
+function verdictParts(look, isLast) {
+  const [kind, mark] = !isLast ? ["open", "so far"] : trial.right === null ? ["open", "Verdict"]
+    : trial.right ? ["right", "✓ right"] : ["wrong", "✗ wrong"];
+  const best = look.unseen > 0.5 ? "a new object" : look.objects.length ? look.objects[0][0] : "one that it remembers";
+  return [element("span", { class: `badge ${kind}` }, mark),
+    isLast ? `The robot says: ${trial.verdict}. ` : `The robot would say: ${best}. `,
+    element("span", { class: "truth" }, `Truth: ${trial.truth}.`)];
+}
+
 function drawLook() {
   const now = Number(slider.value);
   const look = trial.looks[now];
@@ -55,6 +65,7 @@ function drawLook() {
   for (const [id, off] of [["first", now === 0], ["previous", now === 0], ["next", now === last], ["last", now === last]]) {
     document.getElementById(id).disabled = off;
   }
+  show("verdict", verdictParts(look, now === last));
   show("seen-picture", look.frame === null ? largeAspect(look.seen, data.slots)
     : element("img", { src: look.frame, alt: `Camera frame, detected: ${inWords(look.seen, data.slots)}` }));
   show("seen-words", seenWords(look));
@@ -67,7 +78,7 @@ function drawLook() {
   show("next-words", nextWords(look));
   document.querySelectorAll("#looks tbody tr").forEach((row, time) =>
     time === now ? row.setAttribute("aria-current", "step") : row.removeAttribute("aria-current"));
-  show("spoken", `Look ${now} of ${last}. ${seenWords(look)} ${nextWords(look)} Entropy ${look.entropy.toFixed(2)} nats.`);
+  show("spoken", `Look ${now} of ${last}. ${seenWords(look)} ${nextWords(look)} Entropy ${look.verdict_entropy.toFixed(2)} nats.`);
 }
 
 function looksTable() {
@@ -75,7 +86,7 @@ function looksTable() {
   const rows = trial.looks.map((look, time) => {
     const [name, share] = look.objects[0] ?? ["–", null];
     const cells = [inWords(look.seen, data.slots), share === null ? "–" : `${name} ${percent(share)}`, percent(look.unseen),
-      look.entropy.toFixed(3), look.action ?? "–", look.purpose ?? "–"];
+      look.verdict_entropy.toFixed(3), look.action ?? "–", look.purpose ?? "–"];
     return element("tr", {}, element("th", { scope: "row" }, String(time)), cells.map((cell) => element("td", {}, cell)));
   });
   return [element("thead", {}, element("tr", {}, heads.map((head) => element("th", { scope: "col" }, head)))),
@@ -84,9 +95,6 @@ function looksTable() {
 
 function drawTrial(index) {
   trial = data.trials[index];
-  const [kind, mark] = trial.right === null ? ["open", "Verdict"] : trial.right ? ["right", "✓ right"] : ["wrong", "✗ wrong"];
-  show("verdict", element("span", { class: `badge ${kind}` }, mark), `The robot says: ${trial.verdict}. `,
-    element("span", { class: "truth" }, `Truth: ${trial.truth}.`));
   show("legend", graphLegend(data, trial));
   show("looks", looksTable());
   slider.max = trial.looks.length - 1;
@@ -104,7 +112,7 @@ function offerTrials() {
   const offered = data.trials.map((each, index) => [each, index]).filter(([each]) => !onlyWrong.checked || each.right === false);
   chooser.replaceChildren(...offered.map(([each, index]) => {
     const mark = each.right === null ? "" : each.right ? "✓ " : "✗ ";
-    return element("option", { value: index, selected: index === chosen }, `${mark}${each.title}: ${each.verdict}`);
+    return element("option", { value: index, selected: index === chosen }, `${mark}${each.title}`);
   }));
 }
 
