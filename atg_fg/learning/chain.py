@@ -10,9 +10,11 @@ import numpy as np
 from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.learning import kernels, slip_kernels
 from atg_fg.learning.detector_noise import DetectorNoise
+from atg_fg.learning.evidence_learner import SavedChain
 from atg_fg.learning.kernels import Clusters, TrialArrays
 from atg_fg.learning.number_of_objects import log_new_weights, log_partition
 from atg_fg.learning.raw_trials import Recording
+from atg_fg.learning.shared_structure import SharedStructure
 
 #: Beta prior of a slip.
 SLIP_PRIOR: Final = (1.0, 99.0)
@@ -98,6 +100,34 @@ class Chain:
     def copy(self) -> Chain:
         """Return a chain that goes on alone from here."""
         return copy.deepcopy(self)
+
+    def saved(self, maps: SharedStructure | None, recording: Recording) -> SavedChain:
+        """Return the chain as it is kept.
+
+        Args:
+            maps: That it follows, if it has no automaton of its own.
+            recording: The trials that it knows.
+        """
+        stay, there = self.clusters.successors.shape[1] - 1, np.arange(self.actions.shape[1])
+        slips = np.argwhere((self.actions == stay) & (there < recording.lengths[:, None] - 1))
+        return SavedChain(
+            maps,
+            () if maps is not None else tuple(map(tuple, self.successors.tolist())),
+            tuple(self.clusters.owner.tolist()),
+            tuple(self.clusters.start.tolist()),
+            tuple((int(trial), int(time)) for trial, time in slips),
+            self.slip,
+            self.score,
+        )
+
+    def restore(self, saved: SavedChain, task: Task) -> None:
+        """Become the chain that was kept, of the trials of a task."""
+        self.admit(task)
+        self.clusters.owner[:], self.clusters.start[:] = saved.owner, saved.start
+        self.clusters.n_trials[:] = np.bincount(saved.owner, minlength=len(self.clusters.n_trials))
+        for trial, time in saved.slips:
+            self.actions[trial, time] = self.clusters.successors.shape[1] - 1
+        self.slip, self.score = saved.slip, saved.score
 
     @property
     def n_states(self) -> int:

@@ -16,6 +16,7 @@ from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.learning.detector_noise import DetectorNoise
 from atg_fg.learning.learner import StructureLearner
 from atg_fg.learning.raw_trials import RawTrial, Recording
+from atg_fg.learning.shared_structure import SharedStructure
 
 #: Chains of less weight are not followed through a trial.
 LEAST_WEIGHT: Final = 1e-3
@@ -60,6 +61,46 @@ class Verdict(NamedTuple):
     probabilities: FloatArray
 
 
+class SavedChain(NamedTuple):
+    """A chain as it is kept: all else follows from this and the raw trials.
+
+    Attributes:
+        maps: Register maps that it follows, or ``None`` if it has an automaton.
+        successors: Of the automaton: the state that each action leads to, shape [A, S].
+        owner: Cluster of each trial, shape [N].
+        start: First state of each trial, shape [N].
+        slips: Pairs (trial, action) of those that failed.
+        slip: ε.
+        score: ln of the joint probability of all that it believes and saw.
+    """
+
+    maps: SharedStructure | None
+    successors: tuple[tuple[int, ...], ...]
+    owner: tuple[int, ...]
+    start: tuple[int, ...]
+    slips: tuple[tuple[int, int], ...]
+    slip: float
+    score: float
+
+
+class SavedEvidence(NamedTuple):
+    """What was sampled, as it is kept.
+
+    Attributes:
+        chains: All of them.
+        weights: Of each.
+        noise: Of the detector.
+        n_trials: Raw trials that were sampled, the first ones.
+        log_evidence: Of these.
+    """
+
+    chains: tuple[SavedChain, ...]
+    weights: tuple[float, ...]
+    noise: DetectorNoise
+    n_trials: int
+    log_evidence: float
+
+
 class _State(NamedTuple):
     """All that is learned: replaced, never changed."""
 
@@ -82,11 +123,37 @@ class EvidenceLearner:
         noise = DetectorNoise.unknown(self.assumptions.alphabet.n_symbols)
         self._state = _State(None, noise, np.zeros(0), 0, 0.0)
         self._concluded: tuple[RawTrial, _State, Verdict] | None = None
+        self._saved: SavedEvidence | None = None
+
+    def saved(self) -> SavedEvidence | None:
+        """Return what was sampled, as it is kept; ``None`` if nothing was."""
+        state = self._state
+        if self._saved is None and state.population is not None:
+            recording = Recording.of(self.learner.trials[: state.n_trials], self.assumptions.alphabet.n_symbols)
+            chains = tuple(state.population.saved(recording))
+            self._saved = SavedEvidence(
+                chains, tuple(state.weights.tolist()), state.noise, state.n_trials, state.log_evidence
+            )
+        return self._saved
+
+    def restore(self, saved: SavedEvidence) -> None:
+        """Go on from what was sampled once."""
+        self._saved = saved
+
+    def _awake(self) -> _State:
+        """Return the state, made of what was kept if that has not been done yet."""
+        if self._saved is not None and self._state.population is None:
+            saved, population = self._saved, self._population()
+            task = self._task(self.learner.trials[: saved.n_trials], saved.noise)
+            population.restore(saved.chains, task)
+            weights = np.array(saved.weights)
+            self._state = _State(population, saved.noise, weights, saved.n_trials, saved.log_evidence)
+        return self._state
 
     def copy(self, learner: StructureLearner) -> EvidenceLearner:
         """Return one that has learned the same, of another learner with the same trials."""
         twin = EvidenceLearner(learner)
-        twin._state = copy.deepcopy(self._state)
+        twin._state, twin._saved = copy.deepcopy(self._state), self._saved
         return twin
 
     @property
@@ -112,10 +179,15 @@ class EvidenceLearner:
         """Learn from the trial that the learner has just been given."""
         trials, owners = self.learner.trials, self.learner.owners
         done, self._concluded = self._concluded, None
+        state = self._awake()
         if done is not None and done[0] == trials[-1] and done[1].n_trials == len(trials):
-            self._state = done[1]
-        elif self._state.n_trials == len(trials) - 1:
-            self._state = self._sampled(self._state, trials, owners[:-1])[0]
+            state = done[1]
+        elif state.n_trials == len(trials) - 1:
+            state = self._sampled(state, trials, owners[:-1])[0]
+        self._adopt(state)
+
+    def _adopt(self, state: _State) -> None:
+        self._state, self._saved = state, None
 
     def forget_verdict(self) -> None:
         """Sample again before the next verdict: trials have changed hands."""
@@ -144,9 +216,9 @@ class EvidenceLearner:
     @property
     def _current(self) -> _State:
         """What is learned from all trials; those that came in a file without it are sampled all at once."""
-        trials, owners = self.learner.trials, self.learner.owners
-        if self._state.n_trials != len(trials):
-            self._state = self._sampled(self._state, trials, owners[:-1])[0]
+        trials, owners, state = self.learner.trials, self.learner.owners, self._awake()
+        if state.n_trials != len(trials):
+            self._adopt(self._sampled(state, trials, owners[:-1])[0])
         return self._state
 
     def _sampled(self, state: _State, trials: Sequence[RawTrial], owners: Sequence[str]) -> tuple[_State, Verdict]:

@@ -7,6 +7,7 @@ on the exact evidence proposes and of which each chain holds one.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from functools import partial
 from typing import Final, NamedTuple
 
@@ -17,6 +18,8 @@ from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.learning import kernels
 from atg_fg.learning.chain import Chain, Structure, Task
 from atg_fg.learning.detector_noise import DetectorNoise
+from atg_fg.learning.evidence_learner import SavedChain
+from atg_fg.learning.raw_trials import Recording
 from atg_fg.learning.register_search import search_registers
 from atg_fg.learning.shared_structure import SharedStructure
 
@@ -84,6 +87,14 @@ class Population(ABC):
     @abstractmethod
     def log_evidence(self, task: Task) -> float:
         """Return ln p(all trials, each of a fresh object) + ln p(structure) of the best structure."""
+
+    @abstractmethod
+    def saved(self, recording: Recording) -> list[SavedChain]:
+        """Return the chains as they are kept; the recording is of the trials that they know."""
+
+    @abstractmethod
+    def restore(self, saved: Sequence[SavedChain], task: Task) -> None:
+        """Have the chains that were kept, of the trials of a task."""
 
     def tally(self, task: Task, weights: FloatArray, noise: DetectorNoise) -> DetectorNoise:
         """Return the noise that the chains estimate."""
@@ -166,9 +177,23 @@ class AutomatonPopulation(Population):
         )
         return float(fresh.sum()) - self._n_actions * self._n_states * float(np.log(self._n_states))
 
+    def saved(self, recording: Recording) -> list[SavedChain]:
+        """Return the chains as they are kept."""
+        return [chain.saved(None, recording) for chain in self.chains]
+
+    def restore(self, saved: Sequence[SavedChain], task: Task) -> None:
+        """Have the chains that were kept."""
+        self.chains = []
+        for each in saved:
+            chain = self._of(np.array(each.successors, dtype=np.int64))
+            chain.restore(each, task)
+            self.chains.append(chain)
+
     def _new(self, rng: np.random.Generator) -> Chain:
-        successors = rng.integers(self._n_states, size=(self._n_actions, self._n_states))
-        registers = np.arange(self._n_states * self._n_slots).reshape(self._n_states, self._n_slots)
+        return self._of(rng.integers(self._n_states, size=(self._n_actions, self._n_states)))
+
+    def _of(self, successors: IntArray) -> Chain:
+        registers = np.arange(successors.shape[1] * self._n_slots).reshape(-1, self._n_slots)
         return Chain(Structure(successors, registers, registers.size), 0.0, self._n_symbols)
 
     def _annealed(self, task: Task, rng: np.random.Generator) -> Chain:
@@ -226,6 +251,19 @@ class RegisterPopulation(Population):
         """Return ln p(all trials, each of a fresh object) + ln p(maps) of the best maps."""
         best = max(range(len(self.chains)), key=lambda number: self.chains[number].score)
         return self._total(task, self.chains[best].structure, self.maps[best].log_prior)
+
+    def saved(self, recording: Recording) -> list[SavedChain]:
+        """Return the chains as they are kept."""
+        return [chain.saved(maps, recording) for chain, maps in zip(self.chains, self.maps, strict=True)]
+
+    def restore(self, saved: Sequence[SavedChain], task: Task) -> None:
+        """Have the chains that were kept."""
+        self.maps, self.chains = [], []
+        for each in saved:
+            if each.maps is not None:
+                self.maps.append(each.maps)
+                self.chains.append(Chain(compiled_maps(each.maps), each.maps.log_prior, self._n_symbols))
+                self.chains[-1].restore(each, task)
 
     def _total(self, task: Task, structure: Structure, log_prior: float) -> float:
         recording = task.recording

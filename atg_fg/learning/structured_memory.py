@@ -18,7 +18,7 @@ from atg_fg.core.merging import Merge
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Confidences, Detection, Evidence
 from atg_fg.core.transactions import one_transaction
-from atg_fg.learning.evidence_learner import EvidenceLearner
+from atg_fg.learning.evidence_learner import EvidenceLearner, SavedEvidence
 from atg_fg.learning.learner import StructureLearner
 from atg_fg.learning.raw_trials import RawTrial
 
@@ -126,6 +126,14 @@ class StructuredMemory(RobotMemory):
     def erring(self) -> bool:
         """Whether looks err so much that the model in which they do explains the raw trials better."""
         return self.log_erring_weights[0] > self.log_erring_weights[1]
+
+    def restore_evidence(
+        self, saved: SavedEvidence | None, gain: float | None, reassignments: Iterable[Reassignment]
+    ) -> None:
+        """Go on from what was kept: what was sampled, by how much it is ahead, and what changed hands."""
+        if saved is not None:
+            self.evidence.restore(saved)
+        self._gain, self._reassignments = gain, list(reassignments)
 
     @property
     def reassignments(self) -> tuple[Reassignment, ...]:
@@ -249,7 +257,13 @@ class StructuredMemory(RobotMemory):
             return NotImplemented
         if not isinstance(other, StructuredMemory):
             return False
-        return super().__eq__(other) is True and self.learner.same_as(other.learner)
+        if super().__eq__(other) is not True or not self.learner.same_as(other.learner):
+            return False
+        return self._sampled() == other._sampled()
+
+    def _sampled(self) -> tuple[object, ...]:
+        saved = self.evidence.saved()
+        return self.reassignments, None if saved is None else (saved.chains, saved.weights, saved.n_trials)
 
     __hash__ = None
 

@@ -13,6 +13,7 @@ from atg_fg.core.merging import Merge
 from atg_fg.core.patterns import PatternAlphabet
 from atg_fg.learning.structured_memory import StructuredMemory
 from atg_fg.storage.checked_json import check_format, parse_json, placed, read_list, read_object
+from atg_fg.storage.evidence_json import read_evidence, write_evidence
 from atg_fg.storage.structure_json import read_learner, write_learner
 
 MEMORY_FORMAT: Final = "atg-fg/memory"
@@ -40,6 +41,9 @@ def memory_to_document(memory: RobotMemory) -> dict[str, Any]:
         document["merges"] = [write_merge(merge) for merge in memory.merges]
     if isinstance(memory, StructuredMemory):
         document["structure"] = write_learner(memory.learner)
+        evidence = write_evidence(memory)
+        if evidence:
+            document["structure"]["evidence"] = evidence
     return document
 
 
@@ -62,7 +66,10 @@ def memory_from_document(value: Any, place: str = "memory") -> RobotMemory:
     with placed(place):
         if learner is None:
             return RobotMemory(assumptions, memory, merges)
-        return StructuredMemory(assumptions, memory, learner, merges)
+        result = StructuredMemory(assumptions, memory, learner, merges)
+    if "evidence" in document["structure"]:
+        read_evidence(document["structure"]["evidence"], result, f"{place}: structure.evidence")
+    return result
 
 
 def write_merge(merge: Merge) -> dict[str, Any]:

@@ -11,6 +11,7 @@ from typing import Any, Final
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.checks import whole_number
 from atg_fg.core.errors import InvalidInputError, TooLargeError
+from atg_fg.core.patterns import check_confidences
 from atg_fg.learning.learner import MAX_CANDIDATES, StructureLearner
 from atg_fg.learning.rates import PRIORS, Rates
 from atg_fg.learning.raw_trials import RawTrial
@@ -31,6 +32,7 @@ def write_learner(learner: StructureLearner, first: int = 0) -> dict[str, Any]:
                 "object": owner,
                 "observed": [list(detection) for detection in trial.detections],
                 "actions": [names[action] for action in trial.actions],
+                **({"confidences": [list(each) for each in trial.confidences]} if trial.confidences else {}),
             }
             for owner, trial in zip(learner.owners[first:], learner.trials[first:], strict=True)
         ],
@@ -49,7 +51,7 @@ def read_learner(value: Any, assumptions: Assumptions, names: Sequence[str], pla
     Raises:
         InvalidInputError: Anything malformed; the message names the place.
     """
-    fields = read_object(value, place, ("seed", "rates", "candidates", "trials"), optional=("evaluations",))
+    fields = read_object(value, place, ("seed", "rates", "candidates", "trials"), optional=("evaluations", "evidence"))
     learner = StructureLearner(assumptions, whole_number(fields["seed"], f"{place}.seed", least=0))
     learner.n_evaluations = whole_number(fields.get("evaluations", 0), f"{place}.evaluations", least=0)
     candidates = read_list(fields["candidates"], f"{place}.candidates")
@@ -68,7 +70,7 @@ def read_learner(value: Any, assumptions: Assumptions, names: Sequence[str], pla
 
 def _read_trial(value: Any, assumptions: Assumptions, names: Sequence[str], place: str) -> tuple[str, RawTrial]:
     """Return the name of a trial's object, and the trial."""
-    fields = read_object(value, place, ("object", "observed", "actions"))
+    fields = read_object(value, place, ("object", "observed", "actions"), ("confidences",))
     owner = fields["object"]
     if not isinstance(owner, str) or owner not in names:
         raise InvalidInputError(f"{place}.object: {owner!r}; expected the name of an ATG in this memory")
@@ -81,7 +83,12 @@ def _read_trial(value: Any, assumptions: Assumptions, names: Sequence[str], plac
         assumptions.action_index(name, f"{place}.actions[{index}]")
         for index, name in enumerate(read_list(fields["actions"], f"{place}.actions"))
     )
-    trial = RawTrial(detections, actions)
+    stated = read_list(fields.get("confidences", []), f"{place}.confidences")
+    confidences = tuple(
+        check_confidences(read_list(look, where), len(assumptions.alphabet.slots), where)
+        for look, where in ((look, f"{place}.confidences[{index}]") for index, look in enumerate(stated))
+    )
+    trial = RawTrial(detections, actions, confidences)
     trial.check(assumptions, place)
     return owner, trial
 

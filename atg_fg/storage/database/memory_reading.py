@@ -57,7 +57,7 @@ def holds_memory(connection: sqlite3.Connection) -> bool:
 
 
 def _document(connection: sqlite3.Connection, place: str) -> dict[str, Any]:
-    numbers = connection.execute("SELECT n_objects, n_aspects, n_symbols FROM assumptions").fetchone()
+    numbers = connection.execute("SELECT n_objects, n_aspects, n_symbols, exclusive FROM assumptions").fetchone()
     if numbers is None:
         raise InvalidInputError(f"{place}: holds no memory, only records; expected a database with a memory")
     actions, slots = (
@@ -74,7 +74,8 @@ def _document(connection: sqlite3.Connection, place: str) -> dict[str, Any]:
         "format": MEMORY_FORMAT,
         "version": 1,
         "assumptions": {
-            **dict(zip(("n_objects", "n_aspects", "n_symbols"), numbers, strict=True)),
+            **dict(zip(("n_objects", "n_aspects", "n_symbols"), numbers, strict=False)),
+            **({} if numbers[3] == 1 else {"exclusive": {0: False}.get(numbers[3], numbers[3])}),
             "actions": actions,
             "slots": slots,
         },
@@ -120,16 +121,18 @@ def _add_transitions(
 def _structure(
     connection: sqlite3.Connection, text: Any, graphs: dict[Any, dict[str, Any]], place: str
 ) -> dict[str, Any]:
-    section = read_object(_json(text, place), place, ("seed", "evaluations", "rates", "candidates"))
+    section = read_object(_json(text, place), place, ("seed", "evaluations", "rates", "candidates"), ("evidence",))
     trials: list[dict[str, Any]] = []
-    for number, graph, observed, actions in connection.execute(
-        "SELECT number, graph, observed, actions FROM raw_trials ORDER BY number"
+    for number, graph, observed, actions, confidences in connection.execute(
+        "SELECT number, graph, observed, actions, confidences FROM raw_trials ORDER BY number"
     ):
         where = f"{place}.trials[{len(trials)}]"
         if whole_number(number, where, least=0) != len(trials):
             raise InvalidInputError(f"{where}: number {number}; expected {len(trials)}")
         owner = _of(graphs, graph, where)["name"]
         trials.append({"object": owner, "observed": _json(observed, where), "actions": _json(actions, where)})
+        if confidences is not None:
+            trials[-1]["confidences"] = _json(confidences, where)
     return {**section, "trials": trials}
 
 

@@ -9,10 +9,10 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from atg_fg.core.aspect_graph import AspectTransitionGraph
-from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.merging import Merge
 from atg_fg.learning.structured_memory import StructuredMemory
+from atg_fg.storage.evidence_json import write_evidence
 from atg_fg.storage.memory_json import write_merge
 from atg_fg.storage.structure_json import write_learner
 
@@ -52,15 +52,7 @@ def held_by(connection: sqlite3.Connection, memory: RobotMemory) -> Held:
 
 
 def replace_memory(connection: sqlite3.Connection, memory: RobotMemory) -> Held:
-    """Write a whole memory in place of what is there; records of trials stay. Inside of a transaction.
-
-    Raises:
-        InvalidInputError: The alphabet is without exclusion, of which a database has no word.
-    """
-    if not memory.assumptions.alphabet.exclusive:
-        raise InvalidInputError(
-            "database: slots that do not exclude each other; expected a JSON file for such a memory"
-        )
+    """Write a whole memory in place of what is there; records of trials stay. Inside of a transaction."""
     changed = _assumptions_differ(connection, memory)
     tables = ("raw_trials", "structure", "merges", "transitions", "aspects", "graphs", "actions", "slots")
     for table in (*tables, "assumptions"):
@@ -68,8 +60,9 @@ def replace_memory(connection: sqlite3.Connection, memory: RobotMemory) -> Held:
     assumptions = memory.assumptions
     if changed:
         connection.execute("UPDATE trials SET learned = NULL")
-    numbers = (assumptions.n_objects, assumptions.n_aspects, assumptions.alphabet.n_symbols)
-    connection.execute("INSERT INTO assumptions VALUES (1, ?, ?, ?)", numbers)
+    alphabet = assumptions.alphabet
+    numbers = (assumptions.n_objects, assumptions.n_aspects, alphabet.n_symbols, int(alphabet.exclusive))
+    connection.execute("INSERT INTO assumptions VALUES (1, ?, ?, ?, ?)", numbers)
     connection.executemany("INSERT INTO actions VALUES (?, ?)", enumerate(assumptions.actions))
     connection.executemany("INSERT INTO slots VALUES (?, ?)", enumerate(assumptions.alphabet.slots))
     held = write_changes(connection, memory, Held())
@@ -84,12 +77,13 @@ def replace_memory(connection: sqlite3.Connection, memory: RobotMemory) -> Held:
 def _assumptions_differ(connection: sqlite3.Connection, memory: RobotMemory) -> bool:
     """Return whether the database holds a memory under other assumptions."""
     alphabet = memory.assumptions.alphabet
-    row = connection.execute("SELECT n_aspects, n_symbols FROM assumptions").fetchone()
+    row = connection.execute("SELECT n_aspects, n_symbols, exclusive FROM assumptions").fetchone()
     actions, slots = (
         tuple(name for (name,) in connection.execute(f"SELECT name FROM {table} ORDER BY number"))
         for table in ("actions", "slots")
     )
-    new = ((memory.assumptions.n_aspects, alphabet.n_symbols), memory.assumptions.actions, alphabet.slots)
+    sizes = (memory.assumptions.n_aspects, alphabet.n_symbols, int(alphabet.exclusive))
+    new = (sizes, memory.assumptions.actions, alphabet.slots)
     return row is not None and (row, actions, slots) != new
 
 
@@ -168,14 +162,23 @@ def _write_structure(
     """Write the structures in question anew, raw trials that are new, and the owner of those that changed hands."""
     section = write_learner(memory.learner, len(held))
     new = section.pop("trials")
+    evidence = write_evidence(memory)
+    if evidence:
+        section["evidence"] = evidence
     connection.execute("INSERT OR REPLACE INTO structure VALUES (1, ?)", (_compact(section),))
     changed = ((ids[owner], number) for number, owner in enumerate(owners[: len(held)]) if owner != held[number])
     connection.executemany("UPDATE raw_trials SET graph = ? WHERE number = ?", changed)
     rows: Iterable[Any] = (
-        (len(held) + index, ids[trial["object"]], _compact(trial["observed"]), _compact(trial["actions"]))
+        (
+            len(held) + index,
+            ids[trial["object"]],
+            _compact(trial["observed"]),
+            _compact(trial["actions"]),
+            _compact(trial["confidences"]) if "confidences" in trial else None,
+        )
         for index, trial in enumerate(new)
     )
-    connection.executemany("INSERT INTO raw_trials VALUES (?, ?, ?, ?)", rows)
+    connection.executemany("INSERT INTO raw_trials VALUES (?, ?, ?, ?, ?)", rows)
 
 
 def _owners(memory: RobotMemory) -> tuple[str, ...]:

@@ -55,8 +55,14 @@ _VERSION_1: Final = (
 )
 
 
+_VERSION_2: Final = (
+    "ALTER TABLE assumptions ADD COLUMN exclusive INTEGER NOT NULL DEFAULT 1",
+    "ALTER TABLE raw_trials ADD COLUMN confidences TEXT",
+)
+
+
 #: The statements of each step: the first makes the tables of version 1, the n-th leads from version n − 1 to n.
-MIGRATIONS: tuple[tuple[str, ...], ...] = (_VERSION_1,)
+MIGRATIONS: tuple[tuple[str, ...], ...] = (_VERSION_1, _VERSION_2)
 
 
 def version_of(connection: sqlite3.Connection, place: str) -> int:
