@@ -40,6 +40,9 @@ nb_execution_mode = "off"
 myst_enable_extensions = ["dollarmath", "colon_fence"]
 myst_heading_anchors = 3
 
+# Two classes may have one name, such as Chain; which one an annotation means is not known to Sphinx.
+suppress_warnings = ["ref.python"]
+
 autosummary_generate = True
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"
@@ -49,8 +52,12 @@ napoleon_use_ivar = True  # autodoc describes attributes itself
 
 
 def _plain_docstring(app: Any, what: str, name: str, target: Any, options: Any, lines: list[str]) -> None:
-    """Keep Sphinx from taking |𝒵| for a substitution, and a name that ends in an underscore for a link."""
+    """Keep Sphinx from taking |𝒵| for a substitution, and a name that ends in an underscore for a link.
+
+    The command in a line ``Example: atg-fg …``, as help pages show it, is code.
+    """
     lines[:] = [re.sub(r"(?<!`)(\||\w_(?=\W|$))(?!`)", _escaped, line) for line in lines]
+    lines[:] = [re.sub(r"^Example: (atg-fg .*)$", r"Example: ``\1``", line) for line in lines]
 
 
 def _whole_attribute(app: Any, what: str, name: str, target: Any, options: Any, lines: list[str]) -> None:
