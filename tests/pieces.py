@@ -6,9 +6,30 @@ import threading
 import time
 from pathlib import Path
 
+from atg_fg.experiments.executors.base import step_done
+
 
 def square(number):
     return number * number
+
+
+def steps(number):
+    """Do as many steps."""
+    for _ in range(number):
+        step_done()
+    return number
+
+
+def slow_steps(piece):
+    """Do three steps; after the first, wait until the file is there, or not for ever."""
+    (file,) = map(Path, piece)
+    step_done()
+    end = time.monotonic() + 20
+    while not file.exists() and time.monotonic() < end:
+        time.sleep(0.01)
+    step_done()
+    step_done()
+    return file.exists()
 
 
 def begun(folder, number):

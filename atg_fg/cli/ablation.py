@@ -55,7 +55,7 @@ def ablation(
     if log is not None:
         plain_files.check_writable(log)
         kept = AblationLog(log, trials)
-    with options.progress_bar("tests", len(cells) * tests) as advance:
+    with options.progress_bar("trials", len(cells) * tests * trials) as advance:
         seeds = range(seed, seed + tests)
         results = run_ablation(cells, seeds, trials, kept, workers, advance, executor)
     entries = summarise_ablation(results)

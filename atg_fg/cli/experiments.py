@@ -118,9 +118,9 @@ def table1(
         n_objects=objects,
         settled=settled,
     )
-    with options.progress_bar("tests", tests) as advance:
+    with options.progress_bar("trials", tests * trials) as advance:
         plans = [(plan, seed + test) for test in range(tests)]
-        results = run_tests(plans, workers, records, resume, save_memories, executor, lambda *_: advance())
+        results = run_tests(plans, workers, records, resume, save_memories, executor, on_trials=advance)
     summary = summarise(results)
     if settled is not None:
         summary["actions_a_trial"] = actions_a_trial(results)
@@ -233,7 +233,7 @@ def figure3(
         plain_files.check_writable(log)
         kept = Figure3Log(log, plan)
     seeds = range(seed, seed + tests)
-    with options.progress_bar("tests", len(numbers) * len(FIGURE3_POLICIES) * tests) as advance:
+    with options.progress_bar("trials", len(numbers) * len(FIGURE3_POLICIES) * tests * trials) as advance:
         points = figure3_points(plan, numbers, FIGURE3_POLICIES, seeds, workers, advance, kept, executor)
     parameters = {
         "world": world,

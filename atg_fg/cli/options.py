@@ -197,9 +197,9 @@ def console(json_path: str | None = None) -> PlainConsole:
 
 @contextmanager
 def progress_bar(description: str, total: int) -> Iterator[Any]:
-    """Show a progress bar on a terminal; give a function that advances it by one."""
+    """Show a progress bar on a terminal; give a function that advances it, by one if no number is given."""
     error_console = PlainConsole(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
     with Progress(*columns, console=error_console, transient=True, disable=not error_console.is_terminal) as progress:
         task = progress.add_task(description, total=total)
-        yield lambda: progress.advance(task)
+        yield lambda number=1: progress.advance(task, number)

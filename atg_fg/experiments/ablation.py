@@ -99,7 +99,7 @@ def run_ablation(
     n_trials: int,
     log: AblationLog | None = None,
     jobs: int = 1,
-    on_test: Callable[[], None] | None = None,
+    on_trials: Callable[[int], None] | None = None,
     executor: str = "process",
 ) -> dict[Cell, list[TestResult]]:
     """Run every cell with every seed, but for what the log holds, and return the results in the order of ``cells``.
@@ -112,7 +112,7 @@ def run_ablation(
         n_trials: Trials a test.
         log: Where each test is kept as it ends.
         jobs: As for ``run_tests``.
-        on_test: Called after each test that is run.
+        on_trials: As for ``run_logged``.
         executor: As for ``run_tests``.
     """
     # The tests run seed by seed: a run that is cut off has equally many tests in each cell. Within a seed the longest
@@ -120,7 +120,7 @@ def run_ablation(
     variants = list(VARIANTS)
     longest_first = sorted(cells, key=lambda cell: (-variants.index(cell.variant), -cell.actions))
     tests = [(cell, seed) for seed in sorted(seeds) for cell in longest_first]
-    results = run_logged(tests, lambda cell: cell.plan(n_trials), log, jobs, executor, on_test)
+    results = run_logged(tests, lambda cell: cell.plan(n_trials), log, jobs, executor, on_trials)
     return {cell: [results[cell, seed] for seed in seeds] for cell in cells}
 
 

@@ -52,7 +52,7 @@ def figure3_points(
     policies: Sequence[str],
     seeds: Sequence[int],
     jobs: int = 1,
-    on_test: Callable[[], None] | None = None,
+    on_trials: Callable[[int], None] | None = None,
     log: Figure3Log | None = None,
     executor: str = "process",
 ) -> list[dict[str, Any]]:
@@ -64,7 +64,7 @@ def figure3_points(
         policies: Names of policies.
         seeds: Of the tests of each point.
         jobs: As for ``run_tests``.
-        on_test: Called after each test that is run.
+        on_trials: As for ``run_logged``.
         log: Where each test is kept as it ends; those that it holds are not run.
         executor: As for ``run_tests``.
     """
@@ -75,7 +75,7 @@ def figure3_points(
     def plan_of(point: Point) -> TestPlan:
         return replace(plan, n_actions=point.actions, policy=point.policy)
 
-    results = run_logged(tests, plan_of, log, jobs, executor, on_test)
+    results = run_logged(tests, plan_of, log, jobs, executor, on_trials)
     summaries = []
     for point in points:
         scored = [results[point, seed] for seed in seeds]

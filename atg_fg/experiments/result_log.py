@@ -83,7 +83,7 @@ def run_logged(
     log: ResultLog[Cell] | None = None,
     jobs: int = 1,
     executor: str = "process",
-    on_test: Callable[[], None] | None = None,
+    on_trials: Callable[[int], None] | None = None,
 ) -> dict[tuple[Cell, int], TestResult]:
     """Run tests, but for what the log holds, and return the result of each.
 
@@ -93,7 +93,7 @@ def run_logged(
         log: Where each test is kept as it ends.
         jobs: As for ``run_tests``.
         executor: As for ``run_tests``.
-        on_test: Called after each test that is run.
+        on_trials: Called with the number of trials that were done since the last call; those that the log holds count.
     """
     found = {test: log.get(*test) if log else None for test in tests}
     missing = [test for test, result in found.items() if result is None]
@@ -104,9 +104,9 @@ def run_logged(
         done[test] = result
         if log is not None:
             log.add(test[0], result)
-        if on_test is not None:
-            on_test()
 
+    if on_trials is not None:
+        on_trials(sum(plan_of(cell).n_trials for cell, _ in done))
     plans = [(plan_of(cell), seed) for cell, seed in missing]
-    run_tests(plans, jobs, executor=executor, on_result=keep)
+    run_tests(plans, jobs, executor=executor, on_result=keep, on_trials=on_trials)
     return done

@@ -17,7 +17,7 @@ from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.records import TrialRecord, TrialSummary
 from atg_fg.engines import begin_trial, check_engine
-from atg_fg.experiments.executors.base import run_pieces, stop_if_asked
+from atg_fg.experiments.executors.base import is_cluster, run_pieces, step_done
 from atg_fg.experiments.plans import unusual
 from atg_fg.experiments.scores import Score, TestResult
 from atg_fg.experiments.trial import learn_from, run_trial
@@ -116,6 +116,7 @@ def run_test(
         if log is not None:
             for trial in log.resume() if resume else log.begin():
                 _learn_and_score(trial, memory, plan, score)
+                step_done()
         for number in range(score.n_trials, plan.n_trials):
             inference = begin_trial(plan.engine, memory, plan.parameters)
             rng = np.random.default_rng(trial_seeds[number])
@@ -127,7 +128,7 @@ def run_test(
                 log.append(trial)
             if on_trial is not None:
                 on_trial(number, record)
-            stop_if_asked()
+            step_done()
     if memories is not None:
         in_folder = not goes_to_database(memories)
         save_memory(memory, make_folder(memories) / f"memory-{seed:04}.json" if in_folder else memories)
@@ -184,11 +185,13 @@ def run_tests(
     memories: Path | None = None,
     executor: str = "process",
     on_result: Callable[[int, TestResult], None] | None = None,
+    on_trials: Callable[[int], None] | None = None,
 ) -> list[TestResult]:
     """Run each (plan, seed), beginning in this order, and return the results in this order.
 
     The results are the same for any executor and any number of jobs; see ``executors.run_pieces`` for these and for
     ``on_result``. ``records``, ``resume`` and ``memories`` are as for ``run_test``; all workers must have the folders.
+    ``on_trials`` is called in this thread with the number of trials that were done since the last call.
 
     Raises:
         InvalidInputError: As for ``run_test`` and ``run_pieces``.
@@ -200,7 +203,14 @@ def run_tests(
     # A worker always resumes: a worker that died has left a part of the test to it.
     resolved = None if memories is None else memories.resolve()
     run = partial(_run_one_of, records=records, memories=resolved)
-    return run_pieces(run, plans, executor, jobs, on_result)
+
+    def keep(number: int, result: TestResult) -> None:
+        if on_result is not None:
+            on_result(number, result)
+        if on_trials is not None and is_cluster(executor):
+            on_trials(plans[number][0].n_trials)
+
+    return run_pieces(run, plans, executor, jobs, keep, on_trials)
 
 
 def _run_one_of(piece: tuple[TestPlan, int], records: Path | None, memories: Path | None) -> TestResult:

@@ -35,11 +35,12 @@ def test_it_goes_on_where_it_was_cut_off(tmp_path):
     run_ablation(CELLS[:2], [0], N_TRIALS, AblationLog(path, N_TRIALS))
     path.write_bytes(path.read_bytes() + b'{"variant": "paper", "wor')
     ran = []
-    resumed = run_ablation(CELLS, [0, 1], N_TRIALS, AblationLog(path, N_TRIALS), on_test=lambda: ran.append(1))
-    assert len(ran) == 6
+    resumed = run_ablation(CELLS, [0, 1], N_TRIALS, AblationLog(path, N_TRIALS), on_trials=ran.append)
+    assert (ran[0], sum(ran)) == (2 * N_TRIALS, 8 * N_TRIALS)
     assert summarise_ablation(resumed) == summarise_ablation(whole)
-    kept = run_ablation(CELLS, [0, 1], N_TRIALS, AblationLog(path, N_TRIALS), on_test=lambda: ran.append(1))
-    assert len(ran) == 6
+    ran.clear()
+    kept = run_ablation(CELLS, [0, 1], N_TRIALS, AblationLog(path, N_TRIALS), on_trials=ran.append)
+    assert ran == [8 * N_TRIALS]
     assert summarise_ablation(kept) == summarise_ablation(whole)
 
 

@@ -22,7 +22,12 @@ Result = TypeVar("Result")
 EXECUTORS: Final = "process, thread or dask://host:port"
 
 
-_thread = threading.local()
+#: How often it is asked, while pieces run, how many steps they have done.
+_SECONDS: Final = 0.2
+
+
+#: What the piece that runs in this thread has to tell, and to obey.
+_here = threading.local()
 
 
 class Workers(Protocol):
@@ -46,6 +51,9 @@ class Workers(Protocol):
             WorkerLostError: Its worker died in the middle.
         """
 
+    def steps(self) -> int:
+        """Return how many steps all pieces have done so far, as far as that is known before they end."""
+
     def close(self) -> None:
         """End all workers; what they are at is given up."""
 
@@ -56,6 +64,7 @@ def run_pieces(
     executor: str = "process",
     jobs: int = 1,
     on_result: Callable[[int, Result], None] | None = None,
+    on_steps: Callable[[int], None] | None = None,
 ) -> list[Result]:
     """Run a function on every piece and return the results in the order of the pieces.
 
@@ -69,6 +78,8 @@ def run_pieces(
         executor: ``process`` (spawned ones), ``thread``, or the address of a dask scheduler as ``dask://host:port``.
         jobs: Processes or threads; with 1 all is done here, one after the other. A cluster has as many as it has.
         on_result: Called in this thread with the number and the result of each piece as soon as it has ended.
+        on_steps: Called in this thread, now and then, with the number of steps that pieces have done since the last
+            call (``step_done``). A cluster does not tell. Steps of a piece that is run again count again.
 
     Raises:
         InvalidInputError: ``jobs`` or ``executor`` is not as it should be, or no scheduler answers.
@@ -87,11 +98,15 @@ def run_pieces(
 
     jobs = min(jobs, len(pieces))
     if not is_cluster(executor) and jobs <= 1:
-        for number, piece in enumerate(pieces):
-            keep(number, function(piece))
+        tell_steps_to(None if on_steps is None else lambda: on_steps(1))
+        try:
+            for number, piece in enumerate(pieces):
+                keep(number, function(piece))
+        finally:
+            tell_steps_to(None)
     elif pieces:
         with closing(_open(executor, jobs)) as workers:
-            _run_on(workers, function, pieces, keep)
+            _run_on(workers, function, pieces, keep, on_steps)
     return [results[number] for number in range(len(pieces))]
 
 
@@ -100,8 +115,10 @@ def _run_on(
     function: Callable[[Piece], Result],
     pieces: Sequence[Piece],
     keep: Callable[[int, Result], None],
+    on_steps: Callable[[int], None] | None,
 ) -> None:
     """Keep all slots busy until each piece has its result."""
+    told = 0
     waiting = deque(range(len(pieces)))
     running: dict[Future[Result], int] = {}
     losses: Counter[int] = Counter()
@@ -110,7 +127,12 @@ def _run_on(
         while waiting and len(running) < workers.slots:
             number = waiting.popleft()
             running[workers.submit(function, pieces[number])] = number
-        for future in wait(running, return_when=FIRST_COMPLETED).done:
+        patience = None if on_steps is None else _SECONDS
+        ended = wait(running, patience, return_when=FIRST_COMPLETED).done
+        if on_steps is not None and workers.steps() > told:
+            on_steps(workers.steps() - told)
+            told = workers.steps()
+        for future in ended:
             number = running.pop(future)
             try:
                 result = workers.result(future)
@@ -142,14 +164,24 @@ def check_executor(executor: str, name: str = "executor") -> None:
         raise InvalidInputError(f"{name}: {executor!r}; expected {EXECUTORS}")
 
 
-def stop_if_asked() -> None:
-    """Raise ``SystemExit`` in a piece that nobody waits for any more; long pieces call this now and then.
+def step_done() -> None:
+    """Tell that a piece has done a step of its work, such as a trial; long pieces call this after each.
 
-    A process is ended from outside, but a thread has to leave by itself.
+    Raises:
+        SystemExit: Nobody waits for the piece any more. A process is ended from outside, but a thread has to leave by
+            itself.
     """
-    stop: threading.Event | None = getattr(_thread, "stop", None)
+    stop: threading.Event | None = getattr(_here, "stop", None)
     if stop is not None and stop.is_set():
         raise SystemExit
+    tell: Callable[[], None] | None = getattr(_here, "tell", None)
+    if tell is not None:
+        tell()
+
+
+def tell_steps_to(tell: Callable[[], None] | None) -> None:
+    """Let ``step_done`` call a function wherever it is called in this thread."""
+    _here.tell = tell
 
 
 def _open(executor: str, jobs: int) -> Workers:
@@ -172,7 +204,12 @@ class _Threads:
     def __init__(self, slots: int) -> None:
         self.slots = slots
         self._stop = threading.Event()
-        self._pool = ThreadPoolExecutor(slots, initializer=_take_stop, initargs=(self._stop,))
+        self._steps: list[None] = []  # to append is one operation, whatever other threads do
+        self._pool = ThreadPoolExecutor(slots, initializer=self._begin_thread)
+
+    def _begin_thread(self) -> None:
+        _here.stop = self._stop
+        tell_steps_to(lambda: self._steps.append(None))
 
     def submit(self, function: Callable[[Any], Any], piece: Any) -> Future[Any]:
         return self._pool.submit(function, piece)
@@ -180,10 +217,9 @@ class _Threads:
     def result(self, future: Future[Any]) -> Any:
         return future.result()
 
+    def steps(self) -> int:
+        return len(self._steps)
+
     def close(self) -> None:
         self._stop.set()
         self._pool.shutdown(cancel_futures=True)
-
-
-def _take_stop(stop: threading.Event) -> None:
-    _thread.stop = stop

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import os
 import signal
 import threading
@@ -14,6 +15,7 @@ from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any, Final
 
 from atg_fg.core.errors import WorkerLostError
+from atg_fg.experiments.executors.base import tell_steps_to
 
 #: What libraries of linear algebra read when they are loaded. There is a process for each processor already, so threads
 #: of theirs would only take turns; and a sum must not depend on how many there are.
@@ -37,6 +39,7 @@ class WorkerProcesses:
         self.slots = slots
         self._idle: list[_Worker] = []
         self._busy: dict[Future[Any], _Worker] = {}
+        self._all: list[_Worker] = []
 
     def submit(self, function: Callable[[Any], Any], piece: Any) -> Future[Any]:
         """Begin a piece."""
@@ -46,7 +49,8 @@ class WorkerProcesses:
                 return self._begin(worker, function, piece)
             except BrokenProcessPool:  # it died while it was idle
                 worker.pool.shutdown()
-        return self._begin(_Worker(), function, piece)
+        self._all.append(_Worker())
+        return self._begin(self._all[-1], function, piece)
 
     def _begin(self, worker: _Worker, function: Callable[[Any], Any], piece: Any) -> Future[Any]:
         # An interruption waits until the worker is in the list: all workers in the list are ended after it.
@@ -72,6 +76,10 @@ class WorkerProcesses:
         self._idle.append(worker)
         return result
 
+    def steps(self) -> int:
+        """Return how many steps all pieces have done so far."""
+        return sum(worker.steps.value for worker in self._all)
+
     def close(self) -> None:
         """End all processes, those at once that are busy."""
         workers = [*self._idle, *self._busy.values()]
@@ -86,7 +94,9 @@ class _Worker:
 
     def __init__(self) -> None:
         self._context = _RecordingContext()
-        self.pool = ProcessPoolExecutor(1, mp_context=self._context, initializer=_prepare)
+        # Only its process writes to it, so that it needs no lock, which a process that is killed might hold for ever.
+        self.steps = self._context.RawValue(ctypes.c_uint64, 0)
+        self.pool = ProcessPoolExecutor(1, mp_context=self._context, initializer=_prepare, initargs=(self.steps,))
 
     def terminate(self) -> None:
         for process in self._context.processes:
@@ -128,8 +138,13 @@ def _start_of_process() -> Iterator[None]:
             signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
-def _prepare() -> None:
-    """Prepare a worker: it ignores Ctrl-C, and leaves when the process that began it is gone, however that ended."""
+def _prepare(steps: Any) -> None:
+    """Prepare a worker: it counts its steps, ignores Ctrl-C, and leaves when the process that began it is gone."""
+
+    def tell() -> None:
+        steps.value += 1
+
+    tell_steps_to(tell)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_leave_with_parent, daemon=True).start()
 

@@ -36,6 +36,27 @@ def test_results_are_told_as_soon_as_they_are_there(executor, tmp_path):
     assert told[0] != (0, 0)
 
 
+@pytest.mark.parametrize(("executor", "jobs"), [("process", 2), ("thread", 2), ("process", 1)])
+def test_the_steps_of_all_pieces_are_told(executor, jobs):
+    told = []
+    assert run_pieces(pieces.steps, [4, 0, 3, 5], executor, jobs, on_steps=told.append) == [4, 0, 3, 5]
+    assert sum(told) == 12
+    pieces.steps(2)  # outside of a piece nobody is told
+    assert sum(told) == 12
+
+
+@pytest.mark.parametrize("executor", ["process", "thread"])
+def test_steps_are_told_before_a_piece_has_ended(executor, tmp_path):
+    told = []
+
+    def tell(number):
+        told.append(number)
+        (tmp_path / "told").touch()
+
+    assert run_pieces(pieces.slow_steps, [(str(tmp_path / "told"),)] * 2, executor, 2, on_steps=tell) == [True, True]
+    assert sum(told) == 6
+
+
 def test_what_a_piece_raises_is_passed_on(executor):
     with pytest.raises(ValueError, match="three"):
         run_pieces(pieces.refuses_three, range(100), executor, jobs=2)
