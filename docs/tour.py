@@ -1,8 +1,8 @@
 """The tour of commands in ``docs/tour.md``: ``python docs/tour.py`` runs them and writes down what they print.
 
 A command is a line of a console block that begins with ``$``; what follows are the first lines of its output. Where the
-block says ``...`` after them, as many lines are kept as there were, or eight. The processor time of each, in
-seconds, is written behind the block that it stands in.
+block says ``...`` after them, as many lines are kept as there were, or eight; what follows the dots are the last lines.
+The processor time of each, in seconds, is written behind the block that it stands in.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import shlex
 import subprocess
 import sys
 import tempfile
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Final
 
@@ -28,14 +28,21 @@ ENVIRONMENT: Final = {"COLUMNS": "110", "NO_COLOR": "1", "TERM": "dumb"}
 
 @dataclass
 class Command:
-    """A command of the tour, and the first lines of its output; ``cut`` if more lines follow."""
+    """A command of the tour, the first lines of its output, and the last ones; ``cut`` if there are others between."""
 
     line: str
     output: list[str]
-    cut: bool
+    cut: bool = False
+    end: list[str] = field(default_factory=list)
 
     def __str__(self) -> str:
-        return "\n".join([f"$ {self.line}", *self.output, *([CUT] if self.cut else [])])
+        return "\n".join([f"$ {self.line}", *self.output, *([CUT] if self.cut else []), *self.end])
+
+    def shown(self, lines: list[str]) -> tuple[list[str], list[str]]:
+        """Return what the page shows of the lines that the command prints: the first, and the last."""
+        if not self.cut:
+            return lines, []
+        return lines[: len(self.output) or 8], lines[len(lines) - len(self.end) :]
 
 
 def commands_in(block: str) -> list[Command]:
@@ -43,11 +50,11 @@ def commands_in(block: str) -> list[Command]:
     found: list[Command] = []
     for line in block.splitlines():
         if line.startswith("$ "):
-            found.append(Command(line.removeprefix("$ "), [], cut=False))
+            found.append(Command(line.removeprefix("$ "), []))
         elif line == CUT:
             found[-1].cut = True
         else:
-            found[-1].output.append(line)
+            (found[-1].end if found[-1].cut else found[-1].output).append(line)
     return found
 
 
@@ -94,8 +101,7 @@ def _written(block: re.Match[str], folder: Path) -> str:
         times.append(max(1, round(_processor_time() - begun)))
         if done.returncode:
             sys.exit(f"{command.line}: {done.stderr}")
-        lines = printed(done.stdout)
-        command.output = lines[: len(command.output) or 8] if command.cut else lines
+        command.output, command.end = command.shown(printed(done.stdout))
         print(f"{times[-1]:4} s  {command.line}", flush=True)
     text = "\n".join(map(str, found))
     return f"```console\n{text}\n```\n\n*Takes {' + '.join(map(str, times))} s.*\n"
