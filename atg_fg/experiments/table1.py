@@ -25,7 +25,7 @@ from atg_fg.inference.interface import Inference
 from atg_fg.inference.smoothing import smoothed_patterns
 from atg_fg.learning.duplicates import merge_duplicates
 from atg_fg.learning.structured_memory import memory_for
-from atg_fg.policies import Policy, make_policy
+from atg_fg.policies import Policy, check_entropy_threshold, make_policy
 from atg_fg.storage.database.trial_log import DatabaseTrialLog, check_not_in_database
 from atg_fg.storage.growing_file import check_not_begun
 from atg_fg.storage.memory_files import goes_to_database, save_memory
@@ -72,6 +72,8 @@ class TestPlan:
         for name in ("n_actions", "n_trials", "n_objects"):
             whole_number(getattr(self, name), name, least=1)
         check_engine(self.engine, self.parameters)
+        if self.settled is not None:
+            check_entropy_threshold(self.settled, "settled")
         make_policy(self.policy, self.settled)
 
     def make_world(self, objects_seed: int) -> World:
