@@ -101,23 +101,25 @@ class LargeMemory(Inference):
         return [self._matched] if self._classes is None else [self._matched, self._classes.filter]
 
     def _look(self, evidence: Evidence) -> None:
-        objects = self._first_matches(evidence)
-        joining = self._filter_of(objects)
         time = len(self.history.evidence) - 1
-        joining.follow(self.history, until=time)
-        looked = [each.looked(evidence) for each in (self._matched, joining)]
+        objects = self._first_matches(evidence)
+        filters = [self._matched]
+        if len(objects):
+            joining = self._filter_of(objects)
+            joining.follow(self.history, until=time)
+            filters.append(joining)
+        looked = [each.looked(evidence) for each in filters]
         log_weights = [each.log_weight for each in looked]
         classes = self._classes
         if classes is not None:
-            rows = self._class_of[objects]
-            members = classes.members - np.bincount(rows, minlength=classes.n_classes)
+            members = classes.members - np.bincount(self._class_of[objects], minlength=classes.n_classes)
             of_classes = classes.filter.looked(evidence)
             log_weights.append(classes.log_of_classes(of_classes.log_weight, members))
         log_total = log_sum_exp(np.concatenate(log_weights))
         if not np.isfinite(log_total):
             raise self._impossible()
         # From here on nothing is refused any more.
-        for each, after in zip((self._matched, joining), looked, strict=True):
+        for each, after in zip(filters, looked, strict=True):
             each.accept(after)
         if classes is not None:
             classes.filter.accept(of_classes)

@@ -16,6 +16,7 @@ from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.engines import begin_trial
 from atg_fg.engines.large_memory import tables_on_demand
+from atg_fg.engines.large_memory.aspect_filter import AspectFilter
 from atg_fg.engines.large_memory.engine import LargeMemory
 from atg_fg.experiments.engine_comparison import total_variation
 from atg_fg.inference.expected_entropy import best_actions
@@ -227,3 +228,23 @@ def test_tables_that_would_be_too_large_are_refused_and_the_rest_goes_on(monkeyp
 def test_an_option_with_a_bad_value_is_refused(n_exact: object) -> None:
     with pytest.raises(InvalidInputError, match="n_exact"):
         begin_trial("large-memory", RobotMemory(WORLD), ModelParameters(), n_exact=n_exact)
+
+
+@pytest.mark.parametrize("n_exact", [0, 100])
+def test_a_look_costs_as_much_late_in_a_trial_as_early(n_exact: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Only objects that match for the first time are taken through the trial again, and here all match at once."""
+    graphs = [graph(WORLD, str(i), [(i,), (11,)], (0, 0, 1, 2), (1, 1, 0, 1)) for i in range(5)]
+    inference = begin_trial("large-memory", RobotMemory(WORLD, graphs), ModelParameters(0.1, 0.1), n_exact=n_exact)
+    steps, predict = [0], AspectFilter.predict
+
+    def counted(self: AspectFilter, action: int) -> None:
+        steps[-1] += 1
+        predict(self, action)
+
+    monkeypatch.setattr(AspectFilter, "predict", counted)
+    for look in range(200):
+        inference.observe(seen(WORLD, 11 if look % 2 else 0))
+        inference.expected_entropies()
+        steps.append(0)
+        inference.act(look % 2)
+    assert max(steps[3:]) == len(inference._filters())
