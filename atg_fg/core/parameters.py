@@ -6,6 +6,7 @@ import math
 from dataclasses import dataclass
 
 from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.patterns import LEAST_SHARE
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,9 @@ class ModelParameters:
             raise InvalidInputError(f"transition_concentration: {alpha!r}; expected a finite number of at least 0")
         if not _is_finite_number(delta) or not 0 <= delta < 1:
             raise InvalidInputError(f"observation_noise: {delta!r}; expected a number from 0 to below 1")
+        for name in ("transition_concentration", "observation_noise"):
+            if 0 < getattr(self, name) < LEAST_SHARE:
+                raise InvalidInputError(f"{name}: {getattr(self, name)!r}; expected 0, or at least {LEAST_SHARE}")
         for name in ("learn_in_trial", "learn_structure"):
             if not isinstance(getattr(self, name), bool):
                 raise InvalidInputError(f"{name}: {getattr(self, name)!r}; expected true or false")

@@ -40,6 +40,11 @@ Array = TypeVar("Array", bound=NDArray[Any])
 MISSING: Final = -1
 
 
+#: Least noise and concentration of a model besides zero, and least weight of evidence beside the greatest: products of
+#: a few of them are still numbers.
+LEAST_SHARE: Final = 1e-100
+
+
 MAX_PATTERNS: Final = 100_000
 
 
@@ -239,13 +244,24 @@ class Evidence:
         """Raise ``InvalidInputError`` if this is no likelihood over ``n_patterns`` patterns."""
         if self.likelihood.shape != (n_patterns,):
             raise InvalidInputError(f"evidence: shape {self.likelihood.shape}; expected ({n_patterns},)")
-        total = self.likelihood.sum()
-        if not (self.likelihood.min() >= 0 and total < np.inf):
-            raise InvalidInputError(
-                f"evidence: least {self.likelihood.min()}, sum {total}; expected non-negative numbers with a finite sum"
-            )
+        least, greatest = self.likelihood.min(), self.likelihood.max()
+        if not (least >= 0 and greatest < np.inf):  # a NaN is neither
+            raise InvalidInputError(f"evidence: weights from {least} to {greatest}; expected finite ones of at least 0")
         if self.pattern is not None:
             whole_number(self.pattern, "evidence: pattern", 0, n_patterns - 1)
+
+    def scaled(self) -> tuple[Evidence, float]:
+        """Return this evidence as engines take it, and ln of what it was divided by.
+
+        Weights below ``LEAST_SHARE`` of the greatest count as zero: no engine could tell what becomes of them. If the
+        greatest is below ``LEAST_SHARE`` or above its inverse, all are divided by it.
+        """
+        weights, greatest = self.likelihood, float(self.likelihood.max())
+        if ((weights > 0) & (weights < LEAST_SHARE * greatest)).any():
+            weights = np.where(weights < LEAST_SHARE * greatest, 0.0, weights)
+        if greatest and not LEAST_SHARE <= greatest <= 1 / LEAST_SHARE:
+            return Evidence(weights / greatest, self.pattern), math.log(greatest)
+        return (self if weights is self.likelihood else Evidence(weights, self.pattern)), 0.0
 
 
 def check_confidences(confidences: Sequence[float | None], n_slots: int, place: str = "confidences") -> Confidences:

@@ -26,20 +26,15 @@ class Enumeration(Inference):
 
     name: ClassVar[str] = "enumeration"
     exact: ClassVar[bool] = True
+    _log_evidence: float = 0.0
 
     def __init__(self, setup: TrialSetup) -> None:
         super().__init__(setup)
         self.weights: FloatArray = self.model.prior[:, None] * self.model.base_row
-        self._log_scale = 0.0
 
     def identity(self) -> IdentityBelief:
         """Return p(O | z_0:t, a_1:t) (eq. 1 and 2)."""
         return self._identity_of(self.weights)
-
-    @property
-    def log_evidence(self) -> float:
-        """Return ln p(z_0:t | a_1:t)."""
-        return self._log_scale
 
     def _smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
         """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s."""
@@ -57,7 +52,7 @@ class Enumeration(Inference):
         if not total > 0:
             raise self._impossible()
         self.weights = weights / total
-        self._log_scale += float(np.log(total))
+        self._log_evidence += float(np.log(total))
         revelation = self._learn()
         if revelation is not None:
             padding = [(0, 0)] * (self.weights.ndim - 1) + [(0, self.model.n_states - self.weights.shape[-1])]

@@ -28,20 +28,16 @@ class FilterInference(Inference):
     back when the evidence turns, where a plain product would have underflowed to zero.
     """
 
+    _log_evidence: float = 0.0
+
     def __init__(self, setup: TrialSetup) -> None:
         super().__init__(setup)
         self._belief = _State(log_of(self.model.prior), self.model.base_row)
-        self._log_evidence = 0.0
 
     def identity(self) -> IdentityBelief:
         """Return p(O | z_0:t, a_1:t) (eq. 1 and 2)."""
         probabilities = np.exp(self._belief.log_identity)
         return IdentityBelief.of(probabilities, self.model.n_unseen)
-
-    @property
-    def log_evidence(self) -> float:
-        """Return ln p(z_0:t | a_1:t)."""
-        return self._log_evidence
 
     @property
     def aspect_belief(self) -> FloatArray:

@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from atg_fg.core.errors import ImpossibleEvidenceError
 from atg_fg.core.patterns import FloatArray
 from atg_fg.engines.filtering import FilterInference
 from atg_fg.engines.gtsam_cells import CellFactor, EdgesInto, RowKinds, belief_factor
@@ -45,7 +46,10 @@ class GtsamElimination(FilterInference):
     def _smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
         """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s, from the graph given O."""
         graph = RecognitionGraph(self.chain(hypothesis), n_unseen=1)
-        return [graph.aspect_marginal(time)[0] for time in range(graph.last + 1)]
+        try:
+            return [graph.aspect_marginal(time)[0] for time in range(graph.last + 1)]
+        except ImpossibleEvidenceError:
+            return [np.zeros(width) for width in graph.chain.widths]
 
     # Tables that do not change within the trial are made into factors once.
 

@@ -100,10 +100,11 @@ class GtsamRoute(WholeTrialInference):
 
     def _solve(self, chain: Chain) -> Posterior:
         graph = RecognitionGraph(chain, self.model.n_unseen)
-        identity, joint = self._marginals(graph)
+        identity = np.zeros(len(chain.prior))
+        if graph.is_held:
+            identity, joint = self._marginals(graph)
         if not identity.all():
-            belief = graph.identity()
-            identity = np.append(belief.objects, belief.unseen)
+            identity = graph.identity().probabilities
             joint = np.zeros((len(identity), chain.widths[-1]))
             for hypothesis in np.flatnonzero(identity):
                 joint[hypothesis] = self._aspect(graph.given(int(hypothesis)), graph.last)
@@ -112,7 +113,7 @@ class GtsamRoute(WholeTrialInference):
 
     def _smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
         """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s, from the graph given O."""
-        chain = self.chain(hypothesis).scaled()[0]
+        chain = self.chain(hypothesis).scaled()[0].balanced()[0]
         graph = RecognitionGraph(chain, n_unseen=1)
         try:
             return self._aspects_given(graph)

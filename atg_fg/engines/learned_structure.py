@@ -80,7 +80,7 @@ class LearnedStructure(BayesFilter):
         for each in self._followed:
             each.observe(evidence)
         if self._followed:
-            least = self.log_evidence + np.log(RULED_OUT)
+            least = self.log_evidence - self._log_scale + np.log(RULED_OUT)
             self._followed = [each for each in self._followed if log_sum_exp(each.log_joint) > least]
 
     def _act(self, action: int) -> None:
@@ -100,7 +100,7 @@ class LearnedStructure(BayesFilter):
         """Return ln p(z_0:t | a_1:t)."""
         if not self._followed:
             return super().log_evidence
-        return log_sum_exp(np.concatenate(self._log_joints()))
+        return log_sum_exp(np.concatenate(self._log_joints())) + self._log_scale
 
     def conclude(self) -> IdentityBelief:
         """Return the belief at the end of the trial, all raw trials of the memory sampled again in its light.

@@ -72,6 +72,7 @@ class MeanField(SupportedInference):
 
     name: ClassVar[str] = "mean-field"
     exact: ClassVar[bool] = False
+    _log_evidence: float = 0.0
 
     def __init__(
         self,
@@ -90,16 +91,10 @@ class MeanField(SupportedInference):
         self.report: MeanFieldReport | None = None
         # p(O, X_t) as the next look finds it, shape [H, W]
         self._predicted: FloatArray = self.model.prior[:, None] * self.model.base_row
-        self._log_evidence = 0.0
 
     def identity(self) -> IdentityBelief:
         """Return q(O)."""
         return IdentityBelief.of(self.objects, self.model.n_unseen)
-
-    @property
-    def log_evidence(self) -> float:
-        """Return −Σ F over the looks."""
-        return self._log_evidence
 
     @property
     def aspect_belief(self) -> FloatArray:

@@ -48,6 +48,7 @@ class ParticleFilter(SupportedInference):
 
     name: ClassVar[str] = "particle"
     exact: ClassVar[bool] = False
+    _log_evidence: float = 0.0
 
     def __init__(
         self,
@@ -64,7 +65,6 @@ class ParticleFilter(SupportedInference):
         self.weights: FloatArray = np.zeros(0)
         self.rejuvenations = 0
         self._transition: FloatArray | None = None
-        self._log_evidence = 0.0
 
     @property
     def effective_sample_size(self) -> float:
@@ -77,11 +77,6 @@ class ParticleFilter(SupportedInference):
         if len(self.weights):
             probabilities = np.bincount(self.objects, self.weights, self.model.n_hypotheses).astype(np.float64)
         return IdentityBelief.of(probabilities, self.model.n_unseen)
-
-    @property
-    def log_evidence(self) -> float:
-        """Return the estimate of ln p(z_0:t | a_1:t)."""
-        return self._log_evidence
 
     @property
     def aspect_belief(self) -> FloatArray:

@@ -49,7 +49,7 @@ class WholeTrialInference(SupportedInference):
         return IdentityBelief.of(probabilities, self.model.n_unseen)
 
     @property
-    def log_evidence(self) -> float:
+    def _log_evidence(self) -> float:
         """Return ln p(z_0:t | a_1:t), or what the engine takes it to be."""
         return self.posterior.log_evidence
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
@@ -20,6 +20,9 @@ from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import FloatArray
 from atg_fg.inference.history import History
 from atg_fg.inference.recognition_model import COLLECTION, RecognitionModel
+
+#: ln of the least weight of a trial that plain numbers hold with all their digits, and something to spare.
+LN_LEAST: Final = -600.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,6 +64,22 @@ class Chain:
         greatest = [float(table.max()) or 1.0 for table in self.likelihoods]
         likelihoods = tuple(table / scale for table, scale in zip(self.likelihoods, greatest, strict=True))
         return replace(self, likelihoods=likelihoods), float(np.log(greatest).sum())
+
+    def balanced(self) -> tuple[Chain, float]:
+        """Return the chain of one hypothesis with each likelihood over p(z_s | z_0:s-1), and the sum of their ln.
+
+        So the weight of a whole trial is p(O), however improbable its looks are. The chain stays as it is where its
+        numbers are large enough, and from a look on that is impossible.
+        """
+        logarithms = np.array([float(log_joint[0]) for log_joint in forward_pass(self).log_joints])
+        if logarithms.min() > LN_LEAST:
+            return self, 0.0
+        possible = logarithms[np.isfinite(logarithms)]
+        logs = np.zeros(len(self.widths))
+        logs[: len(possible)] = np.diff(possible, prepend=float(log_of(self.prior)[0])) if len(possible) else 0.0
+        logs = logs[: len(self.likelihoods)]
+        likelihoods = tuple(table / np.exp(log) for table, log in zip(self.likelihoods, logs, strict=True))
+        return replace(self, likelihoods=likelihoods), float(logs.sum())
 
 
 def build_chain(

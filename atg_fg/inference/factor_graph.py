@@ -20,7 +20,7 @@ from atg_fg.core.errors import ImpossibleEvidenceError, InvalidInputError
 from atg_fg.core.log_math import log_sum_exp
 from atg_fg.core.patterns import FloatArray
 from atg_fg.inference import gtsam_factors as factors
-from atg_fg.inference.chain import Chain
+from atg_fg.inference.chain import LN_LEAST, Chain, forward_pass
 from atg_fg.inference.factor_graph_svg import recognition_svg
 from atg_fg.inference.gtsam_factors import FactorGraph, key_name
 
@@ -32,16 +32,18 @@ class RecognitionGraph:
         chain: The trial's tables.
         n_unseen: U, how many objects the state *unseen* stands for.
         number: Number of the object if it is one of several, from 1; it goes into the names of the variables.
+        log_scale: ln of what the likelihoods were divided by.
 
     Attributes:
         graph: The ``gtsam.DiscreteFactorGraph``.
         chain: The tables of its factors.
     """
 
-    def __init__(self, chain: Chain, n_unseen: int, number: int = 0) -> None:
+    def __init__(self, chain: Chain, n_unseen: int, number: int = 0, log_scale: float = 0.0) -> None:
         self.chain = chain
         self.n_unseen = n_unseen
         self.number = number
+        self.log_scale = log_scale
         self.graph: FactorGraph = gtsam.DiscreteFactorGraph()
         self._add([self.object_key], chain.prior)
         self._add([self.object_key, self.aspect_key(0)], chain.initial)
@@ -86,14 +88,23 @@ class RecognitionGraph:
     def copy(self) -> RecognitionGraph:
         """Return a graph that shares these factors and can be added to alone."""
         twin = RecognitionGraph.__new__(RecognitionGraph)
-        twin.chain, twin.n_unseen, twin.number = self.chain, self.n_unseen, self.number
+        twin.chain, twin.n_unseen, twin.number, twin.log_scale = self.chain, self.n_unseen, self.number, self.log_scale
         twin.graph = gtsam.DiscreteFactorGraph()
         twin.graph.push_back(self.graph)
         return twin
 
     def given(self, hypothesis: int) -> RecognitionGraph:
-        """Return the graph under one state of O alone; its evidence is p(O = hypothesis, z_0:t | a_1:t)."""
-        return RecognitionGraph(self.chain.given(hypothesis), self.n_unseen, self.number)
+        """Return the graph under one state of O alone; its evidence is p(O = hypothesis, z_0:t | a_1:t).
+
+        Its likelihoods are scaled where their product would be too small a number (``Chain.balanced``).
+        """
+        alone, log_scale = self.chain.given(hypothesis).balanced()
+        return RecognitionGraph(alone, self.n_unseen, self.number, self.log_scale + log_scale)
+
+    @property
+    def is_held(self) -> bool:
+        """Whether plain numbers hold the weight of some object; if not, each object is asked alone."""
+        return bool(forward_pass(self.chain).log_joint.max() > LN_LEAST)
 
     def eliminate(self) -> Any:
         """Return the Bayes net p(O) Π p(X_s | X_{s+1}, O) left by eliminating X_0, …, X_t and then O.
@@ -110,11 +121,11 @@ class RecognitionGraph:
 
     def identity(self) -> IdentityBelief:
         """p(O | z_0:t, a_1:t) (eq. 1 and 2): the marginal of O, which elimination leaves for last."""
-        net = self.eliminate()
-        marginal = net.at(net.size() - 1)
-        weights = np.array(
-            [marginal(factors.assigned({self.object_key: state})) for state in range(len(self.chain.prior))]
-        )
+        weights = np.zeros(len(self.chain.prior))
+        if self.is_held:
+            net = self.eliminate()
+            marginal = net.at(net.size() - 1)
+            weights = np.array([marginal(factors.assigned({self.object_key: state})) for state in range(len(weights))])
         if not weights.all():
             logarithms = self.log_joint()
             weights = np.exp(logarithms - logarithms.max())
@@ -130,8 +141,6 @@ class RecognitionGraph:
         Raises:
             ImpossibleEvidenceError: The evidence has probability zero.
         """
-        if len(self.chain.prior) == 1:
-            return np.array([self._log_evidence_of(self.eliminate())])
         logarithms = np.full(len(self.chain.prior), -np.inf)
         for hypothesis in range(len(logarithms)):
             with contextlib.suppress(ImpossibleEvidenceError):
@@ -157,7 +166,7 @@ class RecognitionGraph:
         """Return ln p(z) by the chain rule: any explanation's ln joint less its ln posterior in ``net``."""
         explanation = net.sample(gtsam.MT19937(0))
         log_joint = sum(np.log(self.graph.at(index)(explanation)) for index in range(self.graph.size()))
-        return float(log_joint - net.logProbability(explanation))
+        return float(log_joint - net.logProbability(explanation)) + self.log_scale
 
     def aspect_marginal(self, time: int) -> FloatArray:
         """p(O, X_time | z_0:t, a_1:t), shape [H, W_time]: filtered for the last time, smoothed before it.
@@ -168,24 +177,26 @@ class RecognitionGraph:
         """
         if not 0 <= time <= self.last:
             raise InvalidInputError(f"time: {time!r}; expected 0 to {self.last}")
+        joint = self._aspect(time) if self.is_held else np.zeros((len(self.chain.prior), self.chain.widths[time]))
+        if not joint.any(axis=1).all():
+            # As in ``identity``, a zero may be a number that is too small; so each object is asked alone.
+            weights = self.identity().probabilities
+            for hypothesis in np.flatnonzero(weights):
+                alone = self.given(int(hypothesis))._aspect(time)[0]
+                joint[hypothesis] = weights[hypothesis] * alone / alone.sum()
+        marginal: FloatArray = joint / joint.sum()
+        return marginal
+
+    def _aspect(self, time: int) -> FloatArray:
+        """Return p(O, X_time, z_0:t | a_1:t) up to a factor, shape [H, W_time], by elimination alone."""
         # The order goes inwards from both ends of the chain, so no table holds more than O and two aspects.
         inwards = [*range(time), *range(self.last, time, -1)]
         sizes = {self.object_key: len(self.chain.prior), self.aspect_key(time): self.chain.widths[time]}
         try:
             _, left = self.graph.eliminatePartialSequential(factors.ordering(map(self.aspect_key, inwards)))
-            joint = factors.table(left.product(), sizes)
+            return factors.table(left.product(), sizes)
         except RuntimeError as error:
             raise impossible() from error
-        by_object = joint.sum(axis=1)
-        if len(by_object) > 1 and not by_object.all():
-            # As in ``identity``, a zero may be a number that is too small; so each object is asked alone.
-            weights = self.identity().probabilities
-            possible = np.flatnonzero(weights)
-            joint = np.zeros_like(joint)
-            for hypothesis in possible:
-                joint[hypothesis] = weights[hypothesis] * self.given(int(hypothesis)).aspect_marginal(time)[0]
-        marginal: FloatArray = joint / joint.sum()
-        return marginal
 
     def marginals(self) -> Any:
         """Return GTSAM's own ``DiscreteMarginals`` of this graph; ask it with ``variable``."""

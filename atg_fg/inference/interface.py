@@ -42,7 +42,7 @@ class Inference(ABC):
 
     A subclass is an engine. It says by ``exact`` whether its posteriors are those of the model, and by
     ``knows_structure`` whether it can let objects follow a structure that all share. It answers ``identity`` and
-    ``log_evidence``, and fills the hooks ``_look`` and ``_act``; it may have a way of its own to
+    ``_log_evidence``, and fills the hooks ``_look`` and ``_act``; it may have a way of its own to
     ``_expected_entropies`` and ``_smoothed_aspects``. Hooks are called once what was asked is known to make sense.
     Options of an engine are keyword-only arguments of its constructor.
 
@@ -54,7 +54,7 @@ class Inference(ABC):
 
     Attributes:
         model: The tables in force.
-        history: What was seen and done so far.
+        history: What was seen and done so far; evidence of very small or large numbers is scaled.
     """
 
     name: ClassVar[str]
@@ -67,6 +67,7 @@ class Inference(ABC):
         self.memory, self.parameters, self.prior = setup
         self.model = self._tables()
         self.history = History()
+        self._log_scale = 0.0
 
     def _tables(self) -> RecognitionModel:
         """Return the tables in force when the trial begins; an engine that does without some of them overrides this."""
@@ -92,12 +93,14 @@ class Inference(ABC):
         if not self.history.awaits_evidence:
             raise InvalidInputError("trial: two observations in a row; expected an action between them")
         evidence.check(self.model.n_patterns)
+        evidence, log_scale = evidence.scaled()
         self.history.evidence.append(evidence)
         try:
             self._look(evidence)
         except BaseException:
             self.history.evidence.pop()
             raise
+        self._log_scale += log_scale
         self._protect()
 
     def act(self, action: int) -> None:
@@ -190,9 +193,14 @@ class Inference(ABC):
         """Return p(O | z_0:t, a_1:t) (eq. 1 and 2)."""
 
     @property
-    @abstractmethod
     def log_evidence(self) -> float:
         """Return ln p(z_0:t | a_1:t)."""
+        return self._log_evidence + self._log_scale
+
+    @property
+    @abstractmethod
+    def _log_evidence(self) -> float:
+        """Ln p(z_0:t | a_1:t) of the evidence in ``history``, or what the engine takes it to be."""
 
     @property
     def total_variation_bound(self) -> float | None:

@@ -25,7 +25,14 @@ def test_learning_is_on_or_off_and_nothing_else(learn: object) -> None:
         ModelParameters(learn_in_trial=learn)
 
 
-@pytest.mark.parametrize(("alpha", "delta"), [(0, 0), (0.0, 0.999), (5, 1e-300), (np.float64(0.5), np.float64(0.5))])
+@pytest.mark.parametrize(("alpha", "delta"), [(0, 0), (0.0, 0.999), (5, 1e-100), (np.float64(0.5), np.float64(0.5))])
 def test_whole_numbers_and_bounds_are_accepted(alpha: float, delta: float) -> None:
     parameters = ModelParameters(alpha, delta)
     assert (parameters.transition_concentration, parameters.observation_noise) == (alpha, delta)
+
+
+@pytest.mark.parametrize("name", ["transition_concentration", "observation_noise"])
+@pytest.mark.parametrize("value", [9e-101, 1e-300, 5e-324])
+def test_what_is_too_little_to_reckon_with_is_refused(name: str, value: float) -> None:
+    with pytest.raises(InvalidInputError, match=f"{name}: {value!r}; expected 0, or at least 1e-100"):
+        ModelParameters(**{name: value})

@@ -129,3 +129,21 @@ def test_symbols_and_evidence_cannot_be_written_to() -> None:
     for array in (alphabet.symbols, Evidence.of_detection(alphabet, (0, 1)).likelihood):
         with pytest.raises(ValueError, match="read-only"):
             array[0] = 0
+
+
+@pytest.mark.parametrize(
+    ("weights", "taken", "divisor"),
+    [
+        ([1.0, 0.5, 0.0], [1.0, 0.5, 0.0], 1.0),
+        ([1.0, 1e-99, 0.0], [1.0, 1e-99, 0.0], 1.0),
+        ([1.0, 1e-101, 0.0], [1.0, 0.0, 0.0], 1.0),
+        ([5e-324, 5e-324, 0.0], [1.0, 1.0, 0.0], 5e-324),
+        ([1e308, 5e307, 5e-324], [1.0, 0.5, 0.0], 1e308),
+        ([0.0, 0.0, 0.0], [0.0, 0.0, 0.0], 1.0),
+    ],
+)
+def test_weights_of_any_size_are_taken_as_numbers_of_a_middling_size(weights, taken, divisor) -> None:
+    evidence, log_scale = Evidence(np.array(weights), 1).scaled()
+    assert evidence.likelihood == pytest.approx(taken, rel=1e-15)
+    assert log_scale == pytest.approx(np.log(divisor))
+    assert evidence.pattern == 1

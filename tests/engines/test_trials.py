@@ -198,3 +198,41 @@ def test_enumeration_refuses_a_trial_that_is_too_long_for_it(memory: RobotMemory
         for _ in range(100):
             inference.act(0)
             inference.observe(seen(WORLD, 0))
+
+
+@pytest.mark.parametrize("learn", [False, True])
+@pytest.mark.parametrize(("alpha", "delta"), [(1e-100, 1e-100), (1e-8, 1e-100), (0.0, 1e-60), (1.0, 1e-100)])
+@pytest.mark.parametrize("engine", [name for name in EXACT_ENGINES if name != "enumeration"])
+def test_noise_next_to_none_is_reckoned_with_in_long_trials(
+    engine: str, alpha: float, delta: float, learn: bool
+) -> None:
+    """Looks that no object explains multiply to less than the least float, and yet some object explains them best."""
+    parameters = ModelParameters(alpha, delta, learn_in_trial=learn)
+    steps = [step for look in (0, 1, 2, 2, 3, 0, 2, 1, 1, 3, 0, 2) for step in (look, 0)][:-1]
+    inference, other = (trial(name, two_objects(), parameters, *steps) for name in (engine, "bayes-filter"))
+    for ours, theirs in zip(answers(inference), answers(other), strict=True):
+        np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-12)
+    assert np.isfinite(inference.log_evidence)
+
+
+@pytest.mark.parametrize("delta", [0.0, 1e-8, 0.1])
+@pytest.mark.parametrize(
+    "weights", [(5e-324, 5e-324, 0, 0), (5e-324, 1, 1, 0), (1e308, 5e-324, 0, 0), (0, 1e-310, 0, 1e300), (1e308,) * 4]
+)
+@pytest.mark.parametrize("engine", EXACT_ENGINES)
+def test_weights_of_any_size_are_judged_alike_by_all_engines(
+    engine: str, weights: tuple[float, ...], delta: float
+) -> None:
+    found = []
+    for name in (engine, "bayes-filter"):
+        inference = trial(name, two_objects(), ModelParameters(0.1, delta), 0, 0)
+        try:
+            inference.observe(Evidence(np.array(weights)))
+            found.append([np.ravel(each) for each in answers(inference)])
+        except (ImpossibleEvidenceError, InvalidInputError) as error:
+            found.append([np.array([str(error)])])
+    for ours, theirs in zip(*found, strict=True):
+        if ours.dtype.kind == "U":
+            assert ours == theirs
+        else:
+            np.testing.assert_allclose(ours, theirs, rtol=1e-9, atol=1e-12)

@@ -196,7 +196,7 @@ class LargeMemory(Inference):
         return self._decide().fell_back
 
     @property
-    def log_evidence(self) -> float:
+    def _log_evidence(self) -> float:
         """Return ln p(z_0:t | a_1:t); the other objects' part of p(z) is off by at most ``total_variation_bound``."""
         return self._log_total
 
