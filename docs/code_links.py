@@ -42,7 +42,9 @@ def _targets(env: Any) -> dict[str, set[Any]]:
         if entry.aliased:
             continue
         for length in (1, 2, len(parts)):
-            if len(parts) >= length and not (length == 1 and entry.objtype in ("attribute", "method", "property")):
+            if len(parts) >= length and not (
+                length == 1 and entry.objtype in ("attribute", "method", "module", "property")
+            ):
                 targets[".".join(parts[-length:])].add(entry)
     return targets
 
