@@ -15,11 +15,10 @@ from atg_fg.core.patterns import FloatArray
 from sim.bodies.kinematics import ArmKinematics
 from sim.bodies.robonaut_joints import PAD_OFFSET, PAD_RADIUS
 from sim.bodies.robot_mapping import shell_mapping
-from sim.bodies.robot_model import BASE, RobotModel, fitted, model_urdf
+from sim.bodies.robot_model import RobotModel, fitted, model_urdf
 from sim.bodies.urdf_reader import read_urdf
 from sim.bodies.urdf_writer import write_robot
 
-_HOLDING_TORQUE: Final = 500.0  # N·m, where the file has no lower limit
 #: The shell's joint angles with the hands raised before the shoulders, clear of all that stands on tables, rad.
 TUCKED_POSTURE: Final[FloatArray] = np.tile([-0.06, 0.0, -2.35, -2.60, 2.11, 0.48, -0.03], (2, 1))
 #: The shell's joint angles with the hands beside the cube, rad: within the joints' limits all through a flip.
@@ -35,10 +34,7 @@ class PreparedRobot:
         meshes: Contents of the meshes that lie beside it, by file name; others are named by their absolute paths.
         kinematics: Of both arms, with the pads by which the hands touch.
         arm_joints: Names of each arm's joints, from the shoulder to the wrist.
-        held: Angles at which motors hold the waist and the neck, by name, rad, with their greatest torques, N·m.
-        head: Name of the joint that carries the camera, or ``base``.
-        eye: Where the camera is in the frame of its link, shape [3], m.
-        look: Which way it looks in that frame, unit vector, shape [3].
+        eye: Where the camera is in the robot's frame, shape [3], m.
         velocity: Greatest speed of each arm joint, shape [2, joints], rad/s.
         effort: Greatest torque of each arm joint, shape [2, joints], N·m.
         home: Joint angles with the hands beside the cube, shape [2, joints], rad.
@@ -51,10 +47,7 @@ class PreparedRobot:
     meshes: Mapping[str, str]
     kinematics: ArmKinematics
     arm_joints: tuple[tuple[str, ...], ...]
-    held: Mapping[str, tuple[float, float]]
-    head: str
     eye: FloatArray
-    look: FloatArray
     velocity: FloatArray
     effort: FloatArray
     home: FloatArray
@@ -82,20 +75,12 @@ def assembled(
     overlapping: tuple[tuple[str, str], ...] = (),
 ) -> PreparedRobot:
     """Return a model with what was found out about it."""
-    mapping = model.mapping
-    held = {**({} if mapping.waist is None else {mapping.waist: 0.0}), **mapping.neck}
-    head = list(mapping.neck)[-1] if mapping.neck else BASE
-    tilt = mapping.eye_tilt or 0.0
-    place = model.joints[head].position if head != BASE else np.zeros(3)
     return PreparedRobot(
         model_urdf(model),
         {},
         kinematics,
-        mapping.arms,
-        {name: (angle, min(model.joints[name].effort, _HOLDING_TORQUE)) for name, angle in held.items()},
-        head,
-        mapping.eye - place,
-        np.array([np.cos(tilt), 0.0, -np.sin(tilt)]),
+        model.mapping.arms,
+        model.mapping.eye,
         _of_arms(model, "velocity"),
         _of_arms(model, "effort"),
         home,

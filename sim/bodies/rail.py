@@ -52,18 +52,21 @@ class Rail:
     Args:
         client: PyBullet's physics client id.
         body: The robot, loaded from what ``on_rail`` returned.
+
+    Attributes:
+        joint: Number of the rail's joint and of the base's link.
     """
 
     def __init__(self, client: int, body: int) -> None:
         self._client, self._body = client, body
         n_joints = pybullet.getNumJoints(body, physicsClientId=client)
         infos = (pybullet.getJointInfo(body, joint, physicsClientId=client) for joint in range(n_joints))
-        (self._joint,) = (info[0] for info in infos if info[1].decode() == _NAME)
+        (self.joint,) = (info[0] for info in infos if info[1].decode() == _NAME)
         self.reset(0.0)
 
     def reset(self, position: float) -> None:
         """Put the base at rest at ``position`` (m); not for use while a trial goes on."""
-        pybullet.resetJointState(self._body, self._joint, position, physicsClientId=self._client)
+        pybullet.resetJointState(self._body, self.joint, position, physicsClientId=self._client)
         self.drive(position)
 
     @property
@@ -85,7 +88,7 @@ class Rail:
         """Let the motor keep the base at ``position`` (m) and ``speed`` (m/s) until told otherwise."""
         pybullet.setJointMotorControl2(
             self._body,
-            self._joint,
+            self.joint,
             pybullet.POSITION_CONTROL,
             targetPosition=position,
             targetVelocity=speed,
@@ -111,5 +114,5 @@ class Rail:
         self.drive(end)
 
     def _state(self) -> tuple[float, ...]:
-        state: tuple[float, ...] = pybullet.getJointState(self._body, self._joint, physicsClientId=self._client)
+        state: tuple[float, ...] = pybullet.getJointState(self._body, self.joint, physicsClientId=self._client)
         return state

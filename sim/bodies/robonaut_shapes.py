@@ -29,11 +29,8 @@ DARK: Final = "0.16 0.17 0.19 1"
 GOLD: Final = "0.86 0.66 0.17 1"
 
 
-#: Where the camera's eye is in the head at neck angles zero, m, and how far it looks down from the head's axis, rad.
-EYE: Final = np.array([-0.022, 0.0, 0.895])
-
-
-EYE_TILT: Final = 0.42
+#: Where the camera's eye is, m.
+EYE: Final = np.array([0.053, 0.0, 0.838])
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Final
+from typing import Final, cast
 
 import numpy as np
 import pybullet
 
 from atg_fg.core.patterns import FloatArray
+from sim.bodies.cube import CUBE_CENTRE
 from sim.bodies.prepared_robot import PreparedRobot, shell
 from sim.bodies.rail import Rail, on_rail
 from sim.bodies.robot_model import BASE
@@ -19,6 +20,8 @@ from sim.bodies.robot_model import BASE
 _NEIGHBOURS: Final = 3
 
 
+#: What the eye looks at: a little before the middle of the cube's place, and below.
+_GAZE: Final = CUBE_CENTRE - [0.02, 0.0, 0.02]
 _JOINT_DAMPING: Final = 0.1  # N·m·s/rad
 
 
@@ -43,6 +46,8 @@ class RobotBody:
         n_joints = pybullet.getNumJoints(self.body, physicsClientId=client)
         infos = [pybullet.getJointInfo(self.body, joint, physicsClientId=client) for joint in range(n_joints)]
         self.joints = {info[1].decode(): index for index, info in enumerate(infos)}
+        #: Links by the names of the joints that move them.
+        self.links = {BASE: -1 if self.rail is None else self.rail.joint, **self.joints}
         self._parents = [info[16] for info in infos]
         #: Joints with an angle, in PyBullet's order.
         self._movable = [index for index, info in enumerate(infos) if info[3] >= 0]
@@ -55,7 +60,6 @@ class RobotBody:
             )
         self._let_neighbours_touch()
         self.let_touch(robot.overlapping)
-        self._hold_waist_and_neck()
         # PyBullet's joints come with motors that brake; the arms are driven by torques.
         free = [0.0] * len(self.arm_joints)
         pybullet.setJointMotorControlArray(
@@ -68,20 +72,26 @@ class RobotBody:
         for joint, angle in zip(self.arm_joints, angles.ravel(), strict=True):
             pybullet.resetJointState(self.body, joint, angle, physicsClientId=self.client)
 
+    def joint_states(self) -> Sequence[tuple[float, ...]]:
+        """Return the arms' joint angles (rad), velocities (rad/s) and more of 14 joints as PyBullet has them."""
+        return cast(
+            Sequence[tuple[float, ...]],
+            pybullet.getJointStates(self.body, self.arm_joints, physicsClientId=self.client),
+        )
+
     def state(self) -> tuple[FloatArray, FloatArray]:
         """Return the arms' joint angles (rad) and velocities (rad/s), each of shape [2, 7]."""
-        states = pybullet.getJointStates(self.body, self.arm_joints, physicsClientId=self.client)
-        both = np.array([state[:2] for state in states]).reshape(2, -1, 2)
+        both = np.array([state[:2] for state in self.joint_states()]).reshape(2, -1, 2)
         return both[..., 0], both[..., 1]
 
     def apply(self, torques: FloatArray) -> None:
         """Drive the arms with torques of shape [2, 7] (N·m) for one step of the simulation."""
+        self.drive(torques.ravel().tolist())
+
+    def drive(self, torques: Sequence[float]) -> None:
+        """Drive the arms with 14 torques (N·m) for one step: the left arm's, then the right one's."""
         pybullet.setJointMotorControlArray(
-            self.body,
-            self.arm_joints,
-            pybullet.TORQUE_CONTROL,
-            forces=torques.ravel().tolist(),
-            physicsClientId=self.client,
+            self.body, self.arm_joints, pybullet.TORQUE_CONTROL, forces=torques, physicsClientId=self.client
         )
 
     def gravity_torques(self, angles: FloatArray) -> FloatArray:
@@ -113,23 +123,8 @@ class RobotBody:
 
     def eye(self) -> tuple[FloatArray, FloatArray]:
         """Return where the camera's eye is and which way it looks in the robot's frame: m, unit vector, shape [3]."""
-        place, rotation = self._head()
-        return place + rotation @ self.model.eye - self.place, rotation @ self.model.look
-
-    def looks_at(self, target: FloatArray) -> FloatArray:
-        """Return the direction, in the frame of the head, from its eye to a point in the robot's frame, shape [3]."""
-        _, rotation = self._head()
-        direction = target - self.eye()[0]
-        return np.asarray(rotation.T @ direction / np.linalg.norm(direction))
-
-    def _head(self) -> tuple[FloatArray, FloatArray]:
-        """Return place (shape [3], m) and rotation ([3, 3]) of the link that carries the camera."""
-        if self.model.head == BASE:
-            return self.place, np.eye(3)
-        place, turn = pybullet.getLinkState(
-            self.body, self.joints[self.model.head], computeForwardKinematics=1, physicsClientId=self.client
-        )[4:6]
-        return np.array(place), np.array(pybullet.getMatrixFromQuaternion(turn)).reshape(3, 3)
+        direction = _GAZE - self.model.eye
+        return self.model.eye, direction / np.linalg.norm(direction)
 
     @property
     def place(self) -> FloatArray:
@@ -161,18 +156,10 @@ class RobotBody:
             chain.append(self._parents[chain[-1]])
         return chain
 
-    def _hold_waist_and_neck(self) -> None:
-        for name, (angle, torque) in self.model.held.items():
-            joint = self.joints[name]
-            pybullet.resetJointState(self.body, joint, angle, physicsClientId=self.client)
-            pybullet.setJointMotorControl2(
-                self.body, joint, pybullet.POSITION_CONTROL, angle, force=torque, physicsClientId=self.client
-            )
-
     def let_touch(self, pairs: Iterable[tuple[str, str]]) -> None:
         """Switch off collisions between pairs of links, by the names of their joints."""
         for one, other in pairs:
-            self._let_touch(self.joints.get(one, -1), self.joints.get(other, -1))
+            self._let_touch(self.links[one], self.links[other])
 
     def _let_neighbours_touch(self) -> None:
         """Switch off collisions between links a few joints apart, and leave all others on."""

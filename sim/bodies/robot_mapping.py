@@ -10,18 +10,19 @@ import numpy as np
 
 from atg_fg.core.patterns import FloatArray
 from sim.bodies.robonaut_joints import ARM_AXIS, NECK, SIDES, WAIST, arm, arm_joint_names, mirrored
-from sim.bodies.robonaut_shapes import EYE, EYE_TILT
+from sim.bodies.robonaut_shapes import EYE
 
 #: Where the middle between the shoulders stands in the robot's frame if nothing is said, m: Robonaut's.
 SHOULDERS: Final = np.array([-0.0255, 0.0, 0.5443])
-#: Leant back, looking down at the table, rad.
+#: Leant back, looking down at the table, rad; NASA's as far back as it goes, to see past its chin.
 _NECK_POSTURE: Final = (0.10, 0.0, -0.65)
-#: As far back as it goes: past the chin the camera has the cube's front in view.
 _NASA_NECK_POSTURE: Final = (0.175, 0.0, -0.65)
-#: Its trunk is deeper than the shell's, so it stands further back, m.
+#: Bent, they make a fist.
+_FINGERS: Final = ("r2/*_arm/hand/*/proximal", "r2/*_arm/hand/*/medial", "r2/*_arm/hand/ringlittle/*")
+#: NASA's trunk is deeper than the shell's, so it stands further back, m.
 _NASA_PLACE: Final = np.array([-0.08, 0.0, 0.0])
-#: On the forehead, m: NASA's own cameras, 10 cm further ahead, look too slantwise at the cube's front.
-_FOREHEAD: Final = np.array([0.05, 0.0, 0.93])
+#: On NASA's forehead, m: its own cameras, 6 cm further ahead, look too slantwise at the cube's front.
+_FOREHEAD: Final = np.array([0.004, 0.0, 0.913])
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,16 +36,14 @@ class RobotMapping:
         name: Of the robot, for people.
         hands: Names of the links in whose frames these vectors are; without them it is the robot's frame at joint
             angles zero.
-        waist: Name of the joint that the trunk turns about, if it has one.
-        neck: Names of the joints that carry the head, and the angle that each is held at, rad.
+        waist: Name of the joint that the trunk turns about, if it has one: its axis is upright.
         held: Positions of other joints, by patterns of their names as shells have them; all others stay at zero.
         shoulders: Where the middle between both arms' first joints stands in the robot's frame, shape [3], m.
         velocity: Greatest speed of each joint, where the file has no lower one, shape [joints], rad/s.
         effort: Greatest torque of each joint, where the file has no lower one, shape [joints], N·m.
         rotor_inertia: Least moment of inertia of each link: its motor's rotor, seen through the gear, shape [joints],
             kg·m².
-        eye: Where the camera is in the robot's frame with the neck at zero, shape [3], m; it moves with the head.
-        eye_tilt: How far it looks down from there, rad; without it, it looks at the cube.
+        eye: Where the camera is in the robot's frame, shape [3], m; it looks at the cube.
     """
 
     arms: tuple[tuple[str, ...], tuple[str, ...]]
@@ -53,30 +52,31 @@ class RobotMapping:
     name: str = "a robot with two arms"
     hands: tuple[str, str] | None = None
     waist: str | None = None
-    neck: Mapping[str, float] = field(default_factory=dict)
     held: Mapping[str, float] = field(default_factory=dict)
     shoulders: FloatArray = field(default_factory=lambda: SHOULDERS)
     velocity: FloatArray = field(default_factory=lambda: np.array([np.inf] * 7))
     effort: FloatArray = field(default_factory=lambda: np.array([np.inf] * 7))
     rotor_inertia: FloatArray = field(default_factory=lambda: np.array([0.03] * 7))
     eye: FloatArray = field(default_factory=lambda: EYE)
-    eye_tilt: float | None = None
 
     @property
     def moved(self) -> tuple[str, ...]:
         """Names of the joints that stay joints; all others are held."""
-        waist = () if self.waist is None else (self.waist,)
-        return (*waist, *self.neck, *self.arms[0], *self.arms[1])
+        return (*self.arms[0], *self.arms[1])
+
+    @property
+    def named(self) -> tuple[str, ...]:
+        """Names of the joints that must be there."""
+        return self.moved if self.waist is None else (self.waist, *self.moved)
 
 
 def nasa_mapping() -> RobotMapping:
     """Return the mapping of NASA's own descriptions of Robonaut 2."""
     return replace(
         shell_mapping(),
-        neck={joint.name: angle for joint, angle in zip(NECK, _NASA_NECK_POSTURE, strict=True)},
+        held={**shell_mapping().held, **_neck(_NASA_NECK_POSTURE)},
         shoulders=SHOULDERS + _NASA_PLACE,
-        eye=_FOREHEAD + _NASA_PLACE,
-        eye_tilt=None,
+        eye=_FOREHEAD,
     )
 
 
@@ -89,11 +89,12 @@ def shell_mapping() -> RobotMapping:
         palm=np.array([[0.0, 0.0, -1.0]] * 2),
         name="NASA's Robonaut 2",
         waist=WAIST.name,
-        neck={joint.name: angle for joint, angle in zip(NECK, _NECK_POSTURE, strict=True)},
-        # A fist.
-        held=dict.fromkeys(("r2/*_arm/hand/*/proximal", "r2/*_arm/hand/*/medial", "r2/*_arm/hand/ringlittle/*"), 1.5),
+        held={**_neck(_NECK_POSTURE), **dict.fromkeys(_FINGERS, 1.5)},
         velocity=np.array([joint.velocity for joint in joints]),
         effort=np.array([joint.effort for joint in joints]),
         rotor_inertia=np.array([joint.rotor_inertia for joint in joints]),
-        eye_tilt=EYE_TILT,
     )
+
+
+def _neck(posture: tuple[float, ...]) -> dict[str, float]:
+    return {joint.name: angle for joint, angle in zip(NECK, posture, strict=True)}

@@ -1,9 +1,9 @@
 """A robot made ready for PyBullet from any description: upright, only the joints that are used, all else held.
 
-Whatever the file looks like, what is loaded has one form: a base at the robot's origin; the waist, the neck and the
-arms hung on it; every link's frame parallel to the robot's when all joints are at zero; one link for all that a joint
-carries. So PyBullet's limit of 128 joints is not met, shapes that overlap in a hand or a trunk are parts of one link,
-and a closed hand stays closed.
+Whatever the file looks like, what is loaded has one form: a base at the robot's origin, with trunk and head; the arms
+hung on it; every link's frame parallel to the robot's when all joints are at zero; one link for all that a joint
+carries. So PyBullet's limit of 128 joints is not met, shapes that overlap in a hand or in the trunk are parts of one
+link, and a closed hand stays closed.
 """
 
 from __future__ import annotations
@@ -24,7 +24,6 @@ from sim.bodies.urdf_reader import Link, Piece, UrdfJoint, UrdfTree, numbers
 
 BASE: Final = "base"
 _LEAST_MASS: Final = 0.3  # kg
-_LEAST_MOMENT: Final = 1e-3  # kg·m², of what is no arm's
 _LEAST_WIDTH: Final = 0.01  # m between the shoulders
 #: An angle that a joint without limits may have, rad.
 _UNLIMITED: Final = 2 * np.pi
@@ -80,7 +79,7 @@ def fitted(tree: UrdfTree, mapping: RobotMapping) -> RobotModel:
     Raises:
         InvalidInputError: What the mapping names is missing, or is none that a robot with two arms can have.
     """
-    missing = [name for name in mapping.moved if name not in tree.joints]
+    missing = [name for name in mapping.named if name not in tree.joints]
     if missing:
         raise InvalidInputError(
             f"{tree.path}: has no joint {', '.join(missing)}; expected the joint names of {mapping.name}"
@@ -165,14 +164,14 @@ class _Fitting:
         link = self._merged(name, links, pose[:3, 3])
         return JointFrame(name, parent, pose[:3, 3], pose[:3, :3] @ joint.axis, lower, upper, velocity, effort, link)
 
-    def _of_arm(self, name: str, values: FloatArray, otherwise: float) -> float:
+    def _of_arm(self, name: str, values: FloatArray) -> float:
         """Return what a mapping says of a joint by its number in its arm."""
-        return next((float(values[arm.index(name)]) for arm in self._mapping.arms if name in arm), otherwise)
+        return next(float(values[arm.index(name)]) for arm in self._mapping.arms if name in arm)
 
     def _limit(self, name: str, kind: str) -> float:
         """Return a joint's greatest speed or torque: the mapping's, or the file's if that is lower."""
         stated = float(getattr(self._tree.joints[name], kind))
-        most = self._of_arm(name, getattr(self._mapping, kind), np.inf)
+        most = self._of_arm(name, getattr(self._mapping, kind))
         limit = min(stated, most) if stated > 0 else most
         if not limit < np.inf:
             raise ValueError(f"joint {name} has no limit of its {kind}")
@@ -181,7 +180,7 @@ class _Fitting:
     def _with_floors(self, link: Link) -> Link:
         """Return a link with the mass and moments of inertia of a robot's part; the same if it has them."""
         moments, axes = np.linalg.eigh(link.inertia)
-        floored = np.maximum(moments, self._of_arm(link.name, self._mapping.rotor_inertia, _LEAST_MOMENT))
+        floored = np.maximum(moments, self._of_arm(link.name, self._mapping.rotor_inertia))
         # No moment can be more than the sum of the others.
         floored[0] += max(0.0, floored[2] - floored[0] - floored[1])
         if link.mass >= _LEAST_MASS and np.allclose(floored, moments):

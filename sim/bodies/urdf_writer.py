@@ -141,7 +141,7 @@ def _text(vector: Sequence[float] | FloatArray) -> str:
     return " ".join(f"{value + 0.0:.15g}" for value in vector)
 
 
-def _superellipsoid(lengthwise: float, around: float, n_rings: int = 14, n_sectors: int = 20) -> str:
+def _superellipsoid(lengthwise: float, around: float, n_rings: int = 8, n_sectors: int = 16) -> str:
     """Return a superellipsoid of half axes 1 in Wavefront OBJ; its exponents are 1 for a ball, towards 0 for a box."""
     up = np.linspace(-np.pi / 2, np.pi / 2, n_rings + 1)[:, None]
     turn = np.linspace(-np.pi, np.pi, n_sectors, endpoint=False)

@@ -27,6 +27,7 @@ _FARTHEST_MISS: Final = 0.03
 
 
 _ROLLING_ITERATIONS: Final = 3
+_ROLLED_ENOUGH: Final = 2e-4  # m
 
 
 class OutOfReachError(AtgError):
@@ -58,7 +59,7 @@ class Manipulator:
         self.look = look
         self.on_phase = on_phase
         self.squarings = 0
-        self._rolled = np.zeros((2, 3))
+        self._rolled = self._rolling = np.zeros((2, 3))
         self._held: FloatArray | None = None
 
     def act(self, action: str) -> None:
@@ -102,26 +103,31 @@ class Manipulator:
                 f"{waypoint.name}: the cube at x {x:.3f}, y {y:.3f} m is out of reach of a hand by "
                 f"{solution.position_error.max():.3f} m; expected it near x {CUBE_CENTRE[0]}, y {CUBE_CENTRE[1]} m"
             )
-        hands = self.kinematics.hands(solution.angles)
         force = waypoint.grip * INWARD @ waypoint.rotation.T
-        grip = (hands.jacobian[:, :3].transpose(0, 2, 1) @ force[..., None])[..., 0]
+        grip = (solution.hands.jacobian[:, :3].transpose(0, 2, 1) @ force[..., None])[..., 0]
         gravity = self.robot.gravity_torques(solution.angles)
         return JointTarget(solution.angles, gravity + grip, waypoint.seconds, waypoint.still)
 
     def _solve(self, waypoint: Waypoint, start: FloatArray) -> Solution:
         """Solve for joint angles, and keep account of how the pads roll over the faces while they hold the cube."""
         if waypoint.name == "approach":
-            self._rolled, self._held = np.zeros((2, 3)), None
-        solution = self._reached(waypoint, start)
+            self._rolled, self._rolling, self._held = np.zeros((2, 3)), np.zeros((2, 3)), None
         if not waypoint.grip:
-            return solution
-        held, rolled = self._held, self._rolled
+            return self._reached(waypoint, start)
+        rolled = self._rolled
+        # Most likely they go on as before.
+        self._rolled = rolled + self._rolling
+        solution = self._reached(waypoint, start)
         for _ in range(_ROLLING_ITERATIONS):
-            hands = waypoint.rotation.T @ self.kinematics.hands(solution.angles).rotation
-            if held is not None:
-                self._rolled = rolled + _rolling(held, hands, self.kinematics.pad_radius)
-                solution = self._reached(waypoint, solution.angles)
-        self._held = waypoint.rotation.T @ self.kinematics.hands(solution.angles).rotation
+            if self._held is None:
+                break
+            before, hands = self._rolled, waypoint.rotation.T @ solution.hands.rotation
+            self._rolled = rolled + _rolling(self._held, hands, self.kinematics.pad_radius)
+            if np.abs(self._rolled - before).max() < _ROLLED_ENOUGH:
+                break
+            solution = self._reached(waypoint, solution.angles)
+        self._rolling = self._rolled - rolled
+        self._held = waypoint.rotation.T @ solution.hands.rotation
         return solution
 
     def _reached(self, waypoint: Waypoint, start: FloatArray) -> Solution:

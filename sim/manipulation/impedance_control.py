@@ -64,6 +64,15 @@ class Exertion:
     saturated_steps: int = 0
     steps: int = 0
 
+    def add(self, velocities: FloatArray, torques: FloatArray, robot: RobotBody) -> None:
+        """Take account of some steps: absolute speeds and torques asked for, shape [steps, 14], rad/s and N·m."""
+        shape = robot.effort.shape
+        velocity, effort = velocities.max(axis=0).reshape(shape), torques.max(axis=0).reshape(shape)
+        self.velocity = np.maximum(self.velocity, velocity / robot.velocity)
+        self.effort = np.maximum(self.effort, np.minimum(effort / robot.effort, 1.0))
+        self.saturated_steps += int((torques > robot.effort.ravel()).any(axis=1).sum())
+        self.steps += len(torques)
+
 
 class ArmController:
     """Drives the arms from target to target.
@@ -77,6 +86,7 @@ class ArmController:
         self.robot = robot
         self._advance = advance
         self.exertion = Exertion()
+        self._springs, self._dampers = np.tile(_STIFFNESS, 2).tolist(), np.tile(_DAMPING, 2).tolist()
         self.reference, _ = robot.state()
         self.feedforward = robot.gravity_torques(self.reference)
 
@@ -91,9 +101,7 @@ class ArmController:
 
     def hold(self, seconds: float) -> None:
         """Stay where the arms are commanded to be."""
-        still = np.zeros_like(self.reference)
-        for _ in range(round(seconds / TIME_STEP)):
-            self._step(self.reference, still, self.feedforward)
+        self._follow((_STIFFNESS * self.reference + self.feedforward)[None], round(seconds / TIME_STEP))
 
     def _sweep(self, targets: Sequence[JointTarget]) -> None:
         """Go through ``targets`` along cubic curves, from rest to rest."""
@@ -129,25 +137,42 @@ class ArmController:
         steps = max(1, round(seconds / TIME_STEP))
         way = ends[1] - ends[0]
         square, cube = _cubic(way, slopes[0], slopes[1])
-        for step in range(steps):
-            if step % _STEPS_PER_REFERENCE == 0:
-                part = min(1.0, (step + _STEPS_PER_REFERENCE / 2) / steps)
-                reference = ends[0] + part * (slopes[0] + part * (square + part * cube))
-                speed = (slopes[0] + part * (2 * square + 3 * part * cube)) / seconds
-                feedforward = loads[0] + part * (loads[1] - loads[0])
-            self._step(reference, speed, feedforward)
+        part = np.minimum(1.0, (np.arange(0, steps, _STEPS_PER_REFERENCE) + _STEPS_PER_REFERENCE / 2) / steps)
+        part = part[:, None, None]
+        reference = ends[0] + part * (slopes[0] + part * (square + part * cube))
+        speed = (slopes[0] + part * (2 * square + 3 * part * cube)) / seconds
+        self._follow(_STIFFNESS * reference + _DAMPING * speed + loads[0] + part * (loads[1] - loads[0]), steps)
 
-    def _step(self, reference: FloatArray, speed: FloatArray, feedforward: FloatArray) -> None:
-        angles, velocities = self.robot.state()
-        wanted = _STIFFNESS * (reference - angles) + _DAMPING * (speed - velocities) + feedforward
-        torques = np.clip(wanted, -self.robot.effort, self.robot.effort)
-        self.robot.apply(torques)
-        self._advance()
-        exertion = self.exertion
-        exertion.steps += 1
-        np.maximum(exertion.velocity, np.abs(velocities) / self.robot.velocity, out=exertion.velocity)
-        np.maximum(exertion.effort, np.abs(torques) / self.robot.effort, out=exertion.effort)
-        exertion.saturated_steps += bool((torques != wanted).any())
+    def _follow(self, commands: FloatArray, steps: int) -> None:
+        """Follow commands, the last one to the end: the torques that are wanted at angle zero and at rest.
+
+        Seven joints twice are too few for arrays to pay, so the law of control is written out in numbers.
+
+        Args:
+            commands: A row for every few steps, shape [rows, 2, 7], N·m.
+            steps: How many.
+        """
+        rows = commands.reshape(len(commands), -1).tolist()
+        robot, advance = self.robot, self._advance
+        most = robot.effort.ravel()
+        least = float(most.min())
+        velocities: list[list[float]] = []
+        torques: list[list[float]] = []
+        for step in range(steps):
+            if step % _STEPS_PER_REFERENCE == 0 and step // _STEPS_PER_REFERENCE < len(rows):
+                command = rows[step // _STEPS_PER_REFERENCE]
+            states = robot.joint_states()
+            wanted = [
+                torque - spring * state[0] - damper * state[1]
+                for torque, spring, damper, state in zip(command, self._springs, self._dampers, states, strict=True)
+            ]
+            weak = max(wanted) > least or min(wanted) < -least
+            robot.drive(np.clip(wanted, -most, most).tolist() if weak else wanted)
+            advance()
+            velocities.append([state[1] for state in states])
+            torques.append(wanted)
+        if steps:
+            self.exertion.add(np.abs(velocities), np.abs(torques), robot)
 
 
 def _cubic(way: FloatArray, first: FloatArray, last: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -53,9 +53,9 @@ class PostureSearch:
         for angles in self._starts(_N_STARTS).reshape(_N_STARTS, 2, -1):
             for pair in {(min(pair), max(pair)) for pair in self._touching(angles, [self._robot.body])}:
                 counts[pair] = counts.get(pair, 0) + 1
-        names = {index: name for name, index in self._robot.joints.items()}
+        names = {index: name for name, index in self._robot.links.items()}
         always = (pair for pair, count in counts.items() if count >= _ALWAYS * _N_STARTS)
-        return sorted((names.get(one, ""), names.get(other, "")) for one, other in always)
+        return sorted((names[one], names[other]) for one, other in always)
 
     def home(self) -> FloatArray:
         """Return joint angles beside the cube from which all three actions come out best, shape [2, joints], rad."""

@@ -13,7 +13,6 @@ import signal
 import subprocess
 import sys
 import tempfile
-from dataclasses import replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
@@ -23,7 +22,6 @@ import pybullet
 
 from atg_fg.core.errors import InvalidInputError
 from sim.bodies.contact_pads import contact_pad
-from sim.bodies.cube import CUBE_CENTRE
 from sim.bodies.prepared_robot import PreparedRobot, assembled, kinematics_of
 from sim.bodies.robot import RobotBody
 from sim.bodies.robot_mapping import nasa_mapping
@@ -36,9 +34,7 @@ _LOG: Final = logging.getLogger(__name__)
 #: Reading meshes and trying postures takes 10 s on a slow machine.
 _TIME_LIMIT: Final = 120.0  # s
 _MEMORY_LIMIT: Final = 4 << 30  # bytes
-_FOUND: Final = ("pads", "pad_radius", "home", "tucked", "overlapping", "look")
-#: The eye looks at the cube, a little before its middle and below.
-_GAZE: Final = CUBE_CENTRE - [0.02, 0.0, 0.02]
+_FOUND: Final = ("pads", "pad_radius", "home", "tucked", "overlapping")
 
 
 def prepared(urdf: Path) -> PreparedRobot:
@@ -63,10 +59,10 @@ def _prepared(urdf: Path, _stamp: int) -> PreparedRobot:
         found_file = Path(folder) / "found.npz"
         _run_examination(urdf, found_file)
         with np.load(found_file) as found:
-            pads, pad_radius, home, tucked, overlapping, look = (found[name] for name in _FOUND)
+            pads, pad_radius, home, tucked, overlapping = (found[name] for name in _FOUND)
     kinematics = kinematics_of(model, pads, pad_radius)
     pairs = tuple((str(one), str(other)) for one, other in overlapping)
-    return replace(assembled(model, kinematics, home, tucked, pairs), look=look)
+    return assembled(model, kinematics, home, tucked, pairs)
 
 
 def _model(urdf: Path) -> RobotModel:
@@ -109,8 +105,7 @@ def examine(model: RobotModel) -> dict[str, Any]:
         overlapping = search.overlapping()
         body.let_touch(overlapping)
         home = search.home()
-        look = body.looks_at(_GAZE) if model.mapping.eye_tilt is None else body.model.look
-        found = (middles, radii, home, search.tucked(home), np.array(overlapping, dtype=str).reshape(-1, 2), look)
+        found = (middles, radii, home, search.tucked(home), np.array(overlapping, dtype=str).reshape(-1, 2))
         return dict(zip(_FOUND, found, strict=True))
     finally:
         pybullet.disconnect(physicsClientId=client)

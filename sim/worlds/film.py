@@ -39,7 +39,8 @@ def observer_of(n_stations: int) -> Camera:
 
 def observed(scene: Scene, camera: Camera) -> NDArray[np.uint8]:
     """Return what an observer sees, RGB, shape [height, width, 3]."""
-    return camera.render(scene.client, _LIGHT, shadow=True)
+    with scene.floor_in_sight():
+        return camera.render(scene.client, _LIGHT, shadow=True)
 
 
 def with_inset(picture: NDArray[np.uint8], inset: NDArray[np.uint8]) -> NDArray[np.uint8]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import weakref
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from typing import Final
 
@@ -29,7 +30,7 @@ _RAIL_SPARE: Final = 0.05  # m beyond the last stations
 _RAILS: Final = (-0.20, 0.12)  # m, under the robot's base
 
 
-_SOLVER_ITERATIONS: Final = 50
+_SOLVER_ITERATIONS: Final = 20
 
 
 #: Contacts are looked at every so many steps.
@@ -39,6 +40,8 @@ _STEPS_PER_SAMPLE: Final = 8
 _GRAVITY: Final = 9.81  # m/s²
 
 
+_FLOOR_SIZE: Final = [4.0, 4.0, 0.01]  # half extents, m
+_FLOOR_HEIGHT, _OUT_OF_SIGHT = -0.51, 50.0  # m
 _STEEL, _FLOOR = (0.45, 0.46, 0.48, 1.0), (0.80, 0.82, 0.84, 1.0)
 
 
@@ -102,7 +105,12 @@ class Scene:
         self.on_step: Callable[[], None] | None = None
         middle = (len(cubes) - 1) / 2
         self._origins = [np.array([0.0, STATION_SPACING * (middle - station), 0.0]) for station in range(len(cubes))]
-        slab(self.client, [4.0, 4.0, 0.01], [0.0, 0.0, -0.51], _FLOOR)
+        # What is touched of the floor is not seen. What is seen of it, dear to draw, is out of the head's sight
+        # but when an observer looks.
+        touched = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=_FLOOR_SIZE, physicsClientId=self.client)
+        speck = pybullet.createVisualShape(pybullet.GEOM_SPHERE, radius=1e-4, physicsClientId=self.client)
+        pybullet.createMultiBody(0, touched, speck, [0.0, 0.0, _FLOOR_HEIGHT], physicsClientId=self.client)
+        self._floor = slab(self.client, _FLOOR_SIZE, [0.0, 0.0, _OUT_OF_SIGHT], _FLOOR, solid=False)
         self.tables = [self._build_table(origin) for origin in self._origins]
         self.cubes: list[CubeBody] = []
         for _ in cubes:
@@ -163,6 +171,16 @@ class Scene:
     def restore(self, state: int) -> None:
         """Set all bodies back to a state that was kept."""
         pybullet.restoreState(stateId=state, physicsClientId=self.client)
+
+    @contextmanager
+    def floor_in_sight(self) -> Iterator[None]:
+        """Let the floor be seen meanwhile."""
+        for height in (_FLOOR_HEIGHT, _OUT_OF_SIGHT):
+            pybullet.resetBasePositionAndOrientation(
+                self._floor, [0.0, 0.0, height], [0.0, 0.0, 0.0, 1.0], physicsClientId=self.client
+            )
+            if height == _FLOOR_HEIGHT:
+                yield
 
     def close(self) -> None:
         """Leave PyBullet; the scene cannot be used any more."""

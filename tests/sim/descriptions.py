@@ -134,19 +134,9 @@ def with_fists_of_boxes(tree):
     return tree
 
 
-def with_overlapping_shapes(tree):
-    """Put on a cover that reaches from the trunk into the head: two links that no joint ties but the neck's three."""
-    geometry = ElementTree.SubElement(
-        ElementTree.SubElement(next(link for link in tree.iter("link") if link.get("name") == "base"), "collision"),
-        "geometry",
-    )
-    ElementTree.SubElement(geometry, "capsule", radius="0.05", length="1.7")
-    return tree
-
-
 def like_nasas():
     """The shell with all in which NASA's own files differ from it."""
     turned = [f"r2/right_arm/{name}" for name in ("joint0", "joint2", "joint4", "wrist/yaw")]
     tokens = [f"r2/{side}_arm/wrist/{name}_link" for side in ("left", "right") for name in ("pitch", "yaw")]
-    tree = with_overlapping_shapes(with_fists_of_boxes(parsed()))
+    tree = with_fists_of_boxes(parsed())
     return with_a_flipped_waist(with_token_masses(with_turned_axes(tree, *turned), *tokens))

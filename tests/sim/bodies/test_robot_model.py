@@ -131,10 +131,10 @@ def test_token_masses_and_inertias_are_raised_and_that_is_noted(tmp_path):
 
 def test_an_inertia_that_no_body_can_have_is_mended(tmp_path):
     tree = descriptions.parsed()
-    (link,) = (link for link in tree.iter("link") if link.get("name") == "r2/neck/joint1_link")
-    for name, moment in (("ixx", "0.0074"), ("iyy", "0.0080"), ("izz", "0.0001")):
+    (link,) = (link for link in tree.iter("link") if link.get("name") == f"{WRIST}_link")
+    for name, moment in (("ixx", "0.074"), ("iyy", "0.180"), ("izz", "0.0001")):
         link.find("inertial/inertia").set(name, moment)
-    moments = np.linalg.eigvalsh(model_of(tree, tmp_path).joints["r2/neck/joint1"].link.inertia)
+    moments = np.linalg.eigvalsh(model_of(tree, tmp_path).joints[WRIST].link.inertia)
     assert moments[0] + moments[1] >= moments[2] - 1e-12
 
 
@@ -180,7 +180,7 @@ def refused(tree, folder, message, mapping=None):
     assert str(caught.value).startswith(f"{path}: ")
 
 
-@pytest.mark.parametrize("missing", [[WRIST], ["r2/neck/joint1", "r2/right_arm/joint3"], ["r2/waist/joint0"]])
+@pytest.mark.parametrize("missing", [[WRIST], ["r2/left_arm/joint1", "r2/right_arm/joint3"], ["r2/waist/joint0"]])
 def test_all_joints_that_are_missing_are_named(tmp_path, missing):
     tree = descriptions.parsed()
     for name in missing:

@@ -25,9 +25,10 @@ def complaints(client, path, capfd):
 
 def test_what_is_written_is_read_back_as_the_table(tmp_path):
     model = fitted(read_urdf(write_robot(tmp_path)), shell_mapping())
-    assert set(model.joints) == set(TABLE) == set(shell_mapping().moved)
+    assert set(model.joints) == set(shell_mapping().moved)
     assert not model.notes
-    for name, joint in TABLE.items():
+    for name in model.joints:
+        joint = TABLE[name]
         read = model.joints[name]
         np.testing.assert_allclose(read.position, joint.position, atol=1e-9)
         np.testing.assert_allclose(read.axis, joint.axis, atol=1e-9)

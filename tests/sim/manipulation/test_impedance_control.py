@@ -34,14 +34,14 @@ def all_alike(joint, change):
 def recorded(controller):
     """All postures and torques from now on, a row a step."""
     states, torques = [], []
-    apply = controller.robot.apply
+    drive = controller.robot.drive
 
     def spy(wanted):
         states.append(controller.robot.state())
-        torques.append(wanted.copy())
-        apply(wanted)
+        torques.append(np.reshape(wanted, (2, 7)))
+        drive(wanted)
 
-    controller.robot.apply = spy
+    controller.robot.drive = spy
     return states, torques
 
 

@@ -166,6 +166,6 @@ def test_the_start_is_not_changed(kinematics):
         ([0.0, 0.0], [0.0, 0.0], [0.0, 0.11], False),
     ],
 )
-def test_a_task_is_reached_within_six_millimetres_and_a_tenth_of_a_radian(position, cone, palm, reaches):
+def test_a_task_is_reached_within_six_millimetres_and_a_tenth_of_a_radian(kinematics, position, cone, palm, reaches):
     errors = (np.array(error) for error in (position, cone, palm))
-    assert Solution(HOME_POSTURE, *errors).reaches() is reaches
+    assert Solution(HOME_POSTURE, *errors, kinematics.hands(HOME_POSTURE)).reaches() is reaches

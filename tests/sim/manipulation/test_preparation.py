@@ -32,10 +32,6 @@ def test_a_robot_with_fists_and_turned_axes_is_made_ready(robot):
     assert (tucked[:, 2] > 0.44 + 0.1).all()
 
 
-def test_what_overlaps_at_rest_does_not_collide(robot):
-    assert robot.overlapping == (("", "r2/neck/joint2"),) or ("", "r2/waist/joint0") in robot.overlapping
-
-
 @pytest.mark.slow
 def test_a_robot_as_unlike_the_shell_as_nasas_turns_the_cube(robot):
     world = RobonautARcubeWorld(urdf=robot)
@@ -59,7 +55,7 @@ def test_the_same_file_is_made_ready_once_and_a_changed_one_anew(tmp_path, monke
 
     def fake(found):
         zero = np.zeros((2, 7))
-        values = (np.zeros((2, 3)), np.zeros(2), zero, zero, np.array([], dtype=str).reshape(0, 2), np.ones(3))
+        values = (np.zeros((2, 3)), np.zeros(2), zero, zero, np.array([], dtype=str).reshape(0, 2))
         np.savez(found, **dict(zip(preparation._FOUND, values, strict=True)))
 
     path = written(descriptions.parsed(), tmp_path)
