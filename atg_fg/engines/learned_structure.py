@@ -307,8 +307,10 @@ class FollowedChain:
         self, chain: BelievedChain, memory: StructuredMemory, log_weight: float, prior: FloatArray | None
     ) -> None:
         self._noise, self._alphabet = memory.evidence.noise, memory.assumptions.alphabet
-        weights = np.append(chain.is_there, np.exp(chain.log_new)) if prior is None else prior
-        self._log_weights: FloatArray = log_weight + np.log(chain.weight) + log_of(weights / weights.sum())
+        beforehand = chain.log_prior
+        if prior is not None:
+            beforehand = np.where(np.isfinite(beforehand), log_of(prior), -np.inf)
+        self._log_weights: FloatArray = log_weight + np.log(chain.weight) + beforehand
         self.filter = PathFilter(chain, self._noise, self._alphabet, self._log_weights)
         n_states = len(chain.registers)
         self._poses = Poses(chain.registers, chain.successors.T, np.arange(n_states), np.full(n_states, 1.0 / n_states))

@@ -7,8 +7,9 @@ from typing import Final, NamedTuple
 
 import numpy as np
 
+from atg_fg.core.log_math import log_sum_exp
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.learning import kernels, slip_kernels
+from atg_fg.learning import gibbs_kernels, kernels, slip_kernels
 from atg_fg.learning.detector_noise import DetectorNoise
 from atg_fg.learning.evidence_learner import SavedChain
 from atg_fg.learning.kernels import Clusters, TrialArrays
@@ -46,12 +47,14 @@ class Task(NamedTuple):
         looks: Their likelihoods, shape [N, T, J, V].
         log_new: ln of the weight of a new object beside each known one, by how many are known.
         log_partition: ln of the prior of a partition, by the number of objects.
+        log_own: ln p(trial | a fresh object with an automaton of its own), shape [N]; empty where none may have one.
     """
 
     recording: Recording
     looks: FloatArray
     log_new: FloatArray
     log_partition: FloatArray
+    log_own: FloatArray
 
     @classmethod
     def of(cls, recording: Recording, noise: DetectorNoise, n_objects: int) -> Task:
@@ -63,6 +66,7 @@ class Task(NamedTuple):
             looks,
             log_new_weights(n_objects, n_trials, n_trials + 3),
             log_partition(n_objects, n_trials, n_trials + 3),
+            np.zeros(0),
         )
 
 
@@ -73,13 +77,15 @@ class Chain:
         structure: Shared by all objects, or what they begin with.
         log_prior: ln of its prior.
         n_symbols: V.
+        may_own: Whether objects may have automata of their own.
 
     Attributes:
         slip: ε, the probability that an action fails.
         score: ln of the joint probability of all that it believes and saw, averaged over its last sweeps.
     """
 
-    def __init__(self, structure: Structure, log_prior: float, n_symbols: int) -> None:
+    def __init__(self, structure: Structure, log_prior: float, n_symbols: int, *, may_own: bool = False) -> None:
+        self.may_own = may_own
         n_states = len(structure.registers)
         stay = np.arange(n_states)[None]
         self.structure, self.log_prior = structure, log_prior
@@ -113,6 +119,10 @@ class Chain:
         return SavedChain(
             maps,
             () if maps is not None else tuple(map(tuple, self.successors.tolist())),
+            tuple(
+                (number - 1, tuple(map(tuple, self.clusters.successors[number, :-1].tolist())))
+                for number in self.own_automata
+            ),
             tuple(self.clusters.owner.tolist()),
             tuple(self.clusters.start.tolist()),
             tuple((int(trial), int(time)) for trial, time in slips),
@@ -125,6 +135,9 @@ class Chain:
         self.admit(task)
         self.clusters.owner[:], self.clusters.start[:] = saved.owner, saved.start
         self.clusters.n_trials[:] = np.bincount(saved.owner, minlength=len(self.clusters.n_trials))
+        for cluster, successors in saved.own:
+            self.clusters.automaton[cluster] = 1 + cluster
+            self.clusters.successors[1 + cluster, :-1] = successors
         for trial, time in saved.slips:
             self.actions[trial, time] = self.clusters.successors.shape[1] - 1
         self.slip, self.score = saved.slip, saved.score
@@ -146,7 +159,12 @@ class Chain:
         new = n_trials - n_known
         grown = n_trials + 2 - len(clusters.n_trials)
         tables = np.broadcast_to(clusters.prior, (grown, *clusters.tables.shape[1:]))
+        successors = clusters.successors
+        if self.may_own:  # room for one of each cluster, after the shared one
+            more = np.repeat(successors[:1], n_trials + 3 - len(successors), axis=0)
+            successors = np.concatenate((successors, more))
         self.clusters = clusters._replace(
+            successors=successors,
             automaton=np.append(clusters.automaton, np.zeros(grown, dtype=np.int64)),
             tables=np.concatenate((clusters.tables, tables)),
             n_trials=np.append(clusters.n_trials, np.zeros(grown, dtype=np.int64)),
@@ -172,7 +190,9 @@ class Chain:
     def place(self, task: Task, numbers: IntArray, rng: np.random.Generator) -> None:
         """Draw object and start of trials that are of no object yet, one after the other."""
         self._learn_again(task)
-        kernels.sweep(self.trials(task), numbers, self.clusters, task.log_new, 1.0, rng, np.zeros(0))
+        gibbs_kernels.sweep(
+            self.trials(task), numbers, self.clusters, task.log_new, self._log_own(task), 1.0, rng, np.zeros(0)
+        )
 
     def sweep(self, task: Task, rng: np.random.Generator, beta: float = 1.0, *, automaton: bool = False) -> FloatArray:
         """Move all trials once, the last one at the end; return p(cluster of the last one | all others), *new* last.
@@ -185,9 +205,12 @@ class Chain:
         """
         trials = self.trials(task)
         if automaton:
-            kernels.transition_moves(trials, self.clusters, 0, beta, rng)
+            for number in (0, *self.own_automata):
+                gibbs_kernels.transition_moves(trials, self.clusters, number, beta, rng)
         votes = np.zeros(len(self.clusters.n_trials) + 1)
-        kernels.sweep(trials, self._order(rng), self.clusters, task.log_new, beta, rng, votes)
+        gibbs_kernels.sweep(
+            trials, self._order(rng), self.clusters, task.log_new, self._log_own(task), beta, rng, votes
+        )
         return votes
 
     def slip_sweep(self, task: Task, rng: np.random.Generator, *, thorough: bool) -> FloatArray:
@@ -216,6 +239,9 @@ class Chain:
         total = self.log_prior + self._learn_again(task) + float(task.log_partition[n_objects])
         # The first trial of an object may begin anywhere: it only gives its states their names.
         total -= (n_trials - n_objects) * float(np.log(self.n_states))
+        for automaton in self.own_automata:
+            used = gibbs_kernels.entries_used(self.trials(task), self.clusters, automaton)
+            total -= used * float(np.log(self.n_states))
         n_slips, n_actions = self._slips(task)
         return total + n_slips * float(np.log(self.slip)) + (n_actions - n_slips) * float(np.log1p(-self.slip))
 
@@ -239,6 +265,32 @@ class Chain:
         """Add weight · p(label is right), and of symbol and label, to what is counted over all chains."""
         labels = task.recording.labels
         kernels.right_probabilities(self.trials(task), self.clusters, labels, weight, right, truth)
+
+    @property
+    def own_automata(self) -> list[int]:
+        """Those that objects have of their own; the one of cluster k is 1 + k."""
+        there = (self.clusters.n_trials > 0) & (self.clusters.automaton > 0)
+        return list(self.clusters.automaton[there].tolist())
+
+    def log_predictive(self, task: Task) -> float:
+        """Return ln p(the last trial | all others), up to the scale of its looks, while it is of no object yet."""
+        self._learn_again(task)
+        trials, last = self.trials(task), len(self.clusters.owner) - 1
+        path = np.zeros(task.looks.shape[1], dtype=np.int64)
+        free, n_objects = gibbs_kernels.take_out(trials, last, self.clusters, path)
+        weights = np.full((len(self.clusters.n_trials), self.n_states), -np.inf)
+        log_new, log_own = float(task.log_new[n_objects]), self._log_own(task)
+        gibbs_kernels.trial_weights(trials, last, self.clusters, free, log_new, weights)
+        total = log_sum_exp(weights.ravel()) - np.log(self.n_states)
+        if len(log_own):
+            share = gibbs_kernels.sharing(self.clusters)
+            weights[free] += np.log(share)
+            total = log_sum_exp(weights.ravel()) - np.log(self.n_states)
+            total = np.logaddexp(total, log_new + np.log(1.0 - share) + log_own[last])
+        return float(total - np.logaddexp(np.log(max(n_objects, 1e-300)), log_new))
+
+    def _log_own(self, task: Task) -> FloatArray:
+        return task.log_own if self.may_own else np.zeros(0)
 
     def _learn_again(self, task: Task) -> float:
         path = np.zeros(task.looks.shape[1], dtype=np.int64)

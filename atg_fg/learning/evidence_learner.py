@@ -7,7 +7,7 @@ seed alone.
 from __future__ import annotations
 
 import copy
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -35,18 +35,17 @@ class BelievedChain(NamedTuple):
         successors: The state that each action leads to, shape [A, S].
         registers: The register in each slot in each state, shape [S, J].
         tables: p(symbol in each register) of each object, and last of a new one, shape [K + 1, R, V].
-        is_there: Whether the chain knows a cluster of each object, shape [K].
+        log_prior: ln p(object) when a trial begins, shape [K + 1]; −∞ of objects that follow another automaton, or that
+            the chain does not know.
         slip: ε.
-        log_new: ln of the weight of a new object beside each known one.
     """
 
     weight: float
     successors: IntArray
     registers: IntArray
     tables: FloatArray
-    is_there: IntArray
+    log_prior: FloatArray
     slip: float
-    log_new: float
 
 
 class Verdict(NamedTuple):
@@ -67,20 +66,24 @@ class SavedChain(NamedTuple):
     Attributes:
         maps: Register maps that it follows, or ``None`` if it has an automaton.
         successors: Of the automaton: the state that each action leads to, shape [A, S].
+        own: Clusters that have automata of their own, each with these.
         owner: Cluster of each trial, shape [N].
         start: First state of each trial, shape [N].
         slips: Pairs (trial, action) of those that failed.
         slip: ε.
         score: ln of the joint probability of all that it believes and saw.
+        rival: Number of its population, and the evidence of that, if there are several.
     """
 
     maps: SharedStructure | None
     successors: tuple[tuple[int, ...], ...]
+    own: tuple[tuple[int, tuple[tuple[int, ...], ...]], ...]
     owner: tuple[int, ...]
     start: tuple[int, ...]
     slips: tuple[tuple[int, int], ...]
     slip: float
     score: float
+    rival: tuple[int, float] | None = None
 
 
 class SavedEvidence(NamedTuple):
@@ -200,9 +203,10 @@ class EvidenceLearner:
             return []
         task, numbers = self._task(trials, state.noise), self._numbers(self.learner.owners, names)
         return [
-            _believed(chain, weight, task, numbers, len(names))
+            part
             for chain, weight in zip(state.population.chains, state.weights.tolist(), strict=True)
             if weight > LEAST_WEIGHT
+            for part in _believed(chain, weight, task, numbers, len(names))
         ]
 
     def objects(self) -> list[int]:
@@ -235,12 +239,14 @@ class EvidenceLearner:
         return learned, Verdict(names, conclusion.probabilities)
 
     def _population(self) -> Population:
-        from atg_fg.learning.populations import AutomatonPopulation, RegisterPopulation
+        from atg_fg.learning.automaton_populations import AutomatonPopulation, RivalPopulations
+        from atg_fg.learning.populations import RegisterPopulation
 
         alphabet, n_actions = self.assumptions.alphabet, len(self.assumptions.actions)
         n_slots = len(alphabet.slots)
         if n_slots == 1 and not alphabet.exclusive:
-            return AutomatonPopulation(self.assumptions.n_aspects, n_slots, n_actions, alphabet.n_symbols)
+            sizes = (self.assumptions.n_aspects, n_slots, n_actions, alphabet.n_symbols)
+            return RivalPopulations(AutomatonPopulation(*sizes), AutomatonPopulation(*sizes, may_own=True))
         return RegisterPopulation(n_slots, n_actions, alphabet.n_symbols)
 
     def _task(self, trials: Sequence[RawTrial], noise: DetectorNoise) -> Task:
@@ -259,19 +265,30 @@ class EvidenceLearner:
         return np.array([number.get(owner, -1) for owner in owners], dtype=np.int64)
 
 
-def _believed(chain: Chain, weight: float, task: Task, numbers: IntArray, n_names: int) -> BelievedChain:
-    """Return a chain with the tables of objects by name; one of which it has several clusters has the largest."""
+def _believed(chain: Chain, weight: float, task: Task, numbers: IntArray, n_names: int) -> Iterator[BelievedChain]:
+    """Yield what a chain says of the objects of each of its automata, the shared one first.
+
+    Of a name that several clusters have, the largest counts. A new object is taken for one that shares.
+    """
     chain.log_joint(task)  # its tables are made anew, with the noise in force
     clusters = chain.clusters
     names = chain.objects(numbers, task)
-    tables = np.broadcast_to(clusters.prior, (n_names + 1, *clusters.tables.shape[1:])).copy()
-    is_there, size = np.zeros(n_names, dtype=np.int64), np.zeros(n_names)
+    largest: dict[int, int] = {}
     for cluster in np.flatnonzero(names >= 0).tolist():
-        name = int(names[cluster])
-        if clusters.n_trials[cluster] > size[name]:
-            tables[name], size[name], is_there[name] = clusters.tables[cluster], clusters.n_trials[cluster], 1
+        rival = largest.setdefault(int(names[cluster]), cluster)
+        if clusters.n_trials[cluster] > clusters.n_trials[rival]:
+            largest[int(names[cluster])] = cluster
     n_objects = int(np.count_nonzero(clusters.n_trials))
-    structure = clusters.successors[0, :-1]
-    return BelievedChain(
-        weight, structure, clusters.registers, tables, is_there, chain.slip, float(task.log_new[n_objects])
-    )
+    log_new = float(task.log_new[n_objects])
+    total = np.logaddexp(np.log(max(len(largest), 1e-300)), log_new)
+    for automaton in (0, *chain.own_automata):
+        tables = np.broadcast_to(clusters.prior, (n_names + 1, *clusters.tables.shape[1:])).copy()
+        log_prior = np.full(n_names + 1, -np.inf)
+        if automaton == 0:
+            log_prior[-1] = log_new - total
+        for name, cluster in largest.items():
+            if clusters.automaton[cluster] == automaton:
+                tables[name], log_prior[name] = clusters.tables[cluster], -total
+        if np.isfinite(log_prior).any():
+            successors = clusters.successors[automaton, :-1]
+            yield BelievedChain(weight, successors, clusters.registers, tables, log_prior, chain.slip)

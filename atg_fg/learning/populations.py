@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from functools import partial
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -25,17 +24,6 @@ from atg_fg.learning.shared_structure import SharedStructure
 
 #: A chain this many nats behind the best is given up.
 HOPELESS: Final = 15.0
-#: Chains of automata, their sweeps a trial, and how much their scores are tempered: these are means over few sweeps.
-N_AUTOMATA: Final = 6
-AUTOMATON_SWEEPS: Final = 12
-AUTOMATON_TEMPERATURE: Final = 2.0
-#: Sweeps of a chain that is made anew, and how hot it begins.
-RESTART_SWEEPS: Final = 40
-RESTART_HOTTEST: Final = 0.1
-#: States of an automaton beyond |G|; states that are not needed cost nothing. At least, and at most, so many.
-SPARE_STATES: Final = 2
-LEAST_STATES: Final = 8
-MOST_STATES: Final = 12
 #: Register maps believed in at once, how many nats the others may be behind the best, and their sweeps a trial.
 MAX_MAPS: Final = 4
 MAPS_WITHIN: Final = 12.0
@@ -50,10 +38,12 @@ class Conclusion(NamedTuple):
     Attributes:
         probabilities: p(the trial is of the object of each name | all trials), *new* last, shape [names + 1].
         weights: Of the chains, in their order; they sum to one.
+        log_predictive: ln p(the trial | all others) before it was taken in, up to the scale of its looks.
     """
 
     probabilities: FloatArray
     weights: FloatArray
+    log_predictive: float = 0.0
 
 
 def is_milestone(n_trials: int) -> bool:
@@ -114,7 +104,7 @@ class Population(ABC):
         return Conclusion(weights @ shares, weights)
 
 
-def _votes_by_name(chain: Chain, votes: FloatArray, names: IntArray, task: Task) -> FloatArray:
+def votes_by_name(chain: Chain, votes: FloatArray, names: IntArray, task: Task) -> FloatArray:
     """Return votes for clusters as votes for names, *new* last; a cluster has the name that most of its looks have."""
     objects = chain.objects(names, task)
     result = np.zeros(int(names.max(initial=-1)) + 2)
@@ -122,88 +112,6 @@ def _votes_by_name(chain: Chain, votes: FloatArray, names: IntArray, task: Task)
     np.add.at(result, objects[there], votes[:-1][there])
     result[-1] = votes[-1]
     return result
-
-
-class AutomatonPopulation(Population):
-    """Chains of automata that all objects share.
-
-    Args:
-        n_aspects: |G|.
-        n_slots: J.
-        n_actions: A.
-        n_symbols: V.
-    """
-
-    def __init__(self, n_aspects: int, n_slots: int, n_actions: int, n_symbols: int) -> None:
-        super().__init__()
-        self._n_states = min(max(n_aspects + SPARE_STATES, LEAST_STATES), MOST_STATES)
-        self._n_slots, self._n_actions, self._n_symbols = n_slots, n_actions, n_symbols
-
-    def advance(self, task: Task, names: IntArray, rng: np.random.Generator) -> Conclusion:
-        """Take in the last trial of a task; at milestones, make the worst chain anew."""
-        if not self.chains:
-            begin = self._new if len(names) == 1 else partial(self._annealed, task)
-            self.chains = [begin(rng) for _ in range(N_AUTOMATA)]
-        elif is_milestone(len(names)):
-            worst = int(np.argmin([chain.score for chain in self.chains]))
-            self.chains[worst] = self._annealed(task, rng)
-        votes = []
-        for chain in self.chains:
-            if len(chain.clusters.owner) < len(names):
-                known = len(chain.clusters.owner)
-                chain.admit(task)
-                chain.place(task, np.arange(known, len(names)), rng)
-            own, scores = np.zeros(int(names.max(initial=-1)) + 2), []
-            for sweep in range(AUTOMATON_SWEEPS):
-                own += _votes_by_name(chain, chain.sweep(task, rng, automaton=True), names, task)
-                if sweep >= AUTOMATON_SWEEPS // 2:
-                    scores.append(chain.log_joint(task))
-            chain.score = float(np.mean(scores))
-            votes.append(own)
-        conclusion = self._conclude(votes, AUTOMATON_TEMPERATURE)
-        best = max(self.chains, key=lambda chain: chain.score)
-        self.chains = [chain if chain.score > best.score - HOPELESS else best.copy() for chain in self.chains]
-        return conclusion
-
-    def log_evidence(self, task: Task) -> float:
-        """Return ln p(all trials, each of a fresh object) + ln p(automaton) of the best chain."""
-        best = max(self.chains, key=lambda chain: chain.score)
-        fresh = kernels.fresh_log_evidence(
-            best.trials(task),
-            best.clusters.successors[0],
-            best.clusters.registers,
-            len(best.clusters.tables[0]),
-            best.clusters.prior,
-        )
-        return float(fresh.sum()) - self._n_actions * self._n_states * float(np.log(self._n_states))
-
-    def saved(self, recording: Recording) -> list[SavedChain]:
-        """Return the chains as they are kept."""
-        return [chain.saved(None, recording) for chain in self.chains]
-
-    def restore(self, saved: Sequence[SavedChain], task: Task) -> None:
-        """Have the chains that were kept."""
-        self.chains = []
-        for each in saved:
-            chain = self._of(np.array(each.successors, dtype=np.int64))
-            chain.restore(each, task)
-            self.chains.append(chain)
-
-    def _new(self, rng: np.random.Generator) -> Chain:
-        return self._of(rng.integers(self._n_states, size=(self._n_actions, self._n_states)))
-
-    def _of(self, successors: IntArray) -> Chain:
-        registers = np.arange(successors.shape[1] * self._n_slots).reshape(-1, self._n_slots)
-        return Chain(Structure(successors, registers, registers.size), 0.0, self._n_symbols)
-
-    def _annealed(self, task: Task, rng: np.random.Generator) -> Chain:
-        chain = self._new(rng)
-        chain.admit(task)
-        chain.scatter(rng)
-        chain.log_joint(task)
-        for beta in np.geomspace(RESTART_HOTTEST, 1.0, RESTART_SWEEPS).tolist():
-            chain.sweep(task, rng, beta, automaton=True)
-        return chain
 
 
 class RegisterPopulation(Population):
@@ -233,7 +141,7 @@ class RegisterPopulation(Population):
             own, scores = np.zeros(int(names.max(initial=-1)) + 2), []
             for sweep in range(MAP_SWEEPS):
                 found = chain.slip_sweep(task, rng, thorough=sweep % 2 == 1)
-                own += _votes_by_name(chain, found, names, task)
+                own += votes_by_name(chain, found, names, task)
                 if sweep >= MAP_SWEEPS // 2:
                     scores.append(chain.log_joint(task))
                 if sweep + 1 < MAP_SWEEPS:

@@ -8,16 +8,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atg_fg.core.patterns import FloatArray, IntArray
+from atg_fg.learning.gibbs_kernels import count_votes, log_total, put_in, take_out, trial_weights
 from atg_fg.learning.kernels import (
     Clusters,
     TrialArrays,
     compiled,
-    count_votes,
     draw_by_logarithm,
-    log_total,
-    put_in,
-    take_out,
-    trial_weights,
 )
 
 #: Paths with slips that are followed at once, and how improbable one may be beside the best.

@@ -55,6 +55,10 @@ def _write_chain(chain: SavedChain, assumptions: Assumptions) -> dict[str, Any]:
         if chain.maps is None
         else {"maps": write_structure(chain.maps, assumptions)}
     )
+    if chain.own:
+        structure["own"] = [[cluster, [list(each) for each in successors]] for cluster, successors in chain.own]
+    if chain.rival is not None:
+        structure["rival"] = list(chain.rival)
     return {
         **structure,
         "owner": list(chain.owner),
@@ -121,7 +125,7 @@ def _read_noise(value: Any, n_symbols: int, place: str) -> DetectorNoise:
 
 
 def _read_chain(value: Any, assumptions: Assumptions, trials: Sequence[RawTrial], place: str) -> SavedChain:
-    fields = read_object(value, place, _CHAIN, ("maps", "successors"))
+    fields = read_object(value, place, _CHAIN, ("maps", "successors", "own", "rival"))
     if ("maps" in fields) == ("successors" in fields):
         raise InvalidInputError(f"{place}: expected either maps or successors")
     maps, successors = None, np.zeros((0, 0), dtype=np.int64)
@@ -136,16 +140,31 @@ def _read_chain(value: Any, assumptions: Assumptions, trials: Sequence[RawTrial]
         shape = (len(assumptions.actions), n_states)
         successors = _whole(fields["successors"], shape, n_states - 1, f"{place}.successors")
     n_trials = len(trials)
+    own = read_list(fields.get("own", []), f"{place}.own")
+    rival = None
+    if "rival" in fields:
+        group, evidence = _pair(fields["rival"], f"{place}.rival")
+        rival = (whole_number(group, f"{place}.rival[0]", 0, 1), number(evidence, f"{place}.rival[1]"))
     slips = read_list(fields["slips"], f"{place}.slips")
     return SavedChain(
         maps,
         tuple(map(tuple, successors.tolist())),
+        tuple(_read_own(each, n_trials, successors.shape, f"{place}.own[{index}]") for index, each in enumerate(own)),
         tuple(_whole(fields["owner"], (n_trials,), n_trials + 1, f"{place}.owner").tolist()),
         tuple(_whole(fields["start"], (n_trials,), n_states - 1, f"{place}.start").tolist()),
         tuple(_read_slip(slip, trials, f"{place}.slips[{index}]") for index, slip in enumerate(slips)),
         number(fields["slip"], f"{place}.slip", 1e-12, 1.0 - 1e-12),
         number(fields["score"], f"{place}.score"),
+        rival,
     )
+
+
+def _read_own(value: Any, n_trials: int, shape: tuple[int, ...], place: str) -> tuple[int, tuple[tuple[int, ...], ...]]:
+    cluster, successors = _pair(value, place)
+    if not shape[0]:
+        raise InvalidInputError(f"{place}: an automaton beside maps; expected none")
+    table = _whole(successors, shape, shape[1] - 1, f"{place}[1]")
+    return whole_number(cluster, f"{place}[0]", 0, n_trials + 1), tuple(map(tuple, table.tolist()))
 
 
 def _read_slip(value: Any, trials: Sequence[RawTrial], place: str) -> tuple[int, int]:

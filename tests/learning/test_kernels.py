@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from atg_fg.learning import kernels, map_kernels, slip_kernels
+from atg_fg.learning import gibbs_kernels, kernels, map_kernels, slip_kernels
 from atg_fg.learning.chain import Chain, Structure, Task
 from atg_fg.learning.detector_noise import DetectorNoise
 from atg_fg.learning.kernels import TrialArrays
@@ -53,7 +53,11 @@ def chain_of(trials, owner, start):
     )
     n_trials = len(owner)
     task = Task(
-        recording, trials.looks, log_new_weights(5, n_trials, n_trials + 3), log_partition(5, n_trials, n_trials + 3)
+        recording,
+        trials.looks,
+        log_new_weights(5, n_trials, n_trials + 3),
+        log_partition(5, n_trials, n_trials + 3),
+        np.zeros(0),
     )
     chain = Chain(RING, 0.0, 3)
     chain.admit(task)
@@ -86,7 +90,7 @@ def test_weights_of_a_trial_are_those_of_enumeration():
     trials = drawn_trials(np.random.default_rng(3))
     chain, _ = chain_of(trials, [0, 0, 1, -1], [0, 2, 1, 0])
     weights = np.zeros((len(chain.clusters.n_trials), 3))
-    kernels.trial_weights(trials, 3, chain.clusters, 2, 0.7, weights)
+    gibbs_kernels.trial_weights(trials, 3, chain.clusters, 2, 0.7, weights)
     clusters = [[(0, 0, ()), (1, 2, ())], [(2, 1, ())]]
     for start in range(3):
         for number, cluster in enumerate(clusters):
@@ -107,7 +111,7 @@ def test_a_trial_move_draws_from_the_conditional_distribution():
     votes = np.zeros(len(chain.clusters.n_trials) + 1)
     rng, counts = np.random.default_rng(5), np.zeros((2, 3))
     for _ in range(4000):
-        kernels.trial_move(trials, 0, chain.clusters, task.log_new, 1.0, rng, votes)
+        gibbs_kernels.trial_move(trials, 0, chain.clusters, task.log_new, np.zeros(0), 1.0, rng, votes)
         counts[int(chain.clusters.owner[0] != 1), chain.clusters.start[0]] += 1
     assert votes[1] / 4000 == pytest.approx(expected[0].sum(), abs=1e-12)
     assert votes[-1] / 4000 == pytest.approx(expected[1].sum(), abs=1e-12)
@@ -260,3 +264,49 @@ def test_the_same_seed_draws_the_same():
         chain.sweep(task, np.random.default_rng(12))
         results.append((chain.clusters.owner.tolist(), chain.clusters.start.tolist()))
     assert results[0] == results[1]
+
+
+def test_evidence_of_an_automaton_of_its_own_is_the_mean_over_all_automata():
+    trials = drawn_trials(np.random.default_rng(13), n_trials=1, n_looks=3)
+    total, n_automata = 0.0, 0
+    for entries in itertools.product(range(2), repeat=4):
+        successors = np.array(entries).reshape(2, 2)
+        registers = np.array([[0], [1]])
+        total += np.exp(kernels.fresh_log_evidence(trials, successors, registers, 2, PRIOR)[0])
+        n_automata += 1
+    found = gibbs_kernels.own_log_evidence(trials, 0, 2, 2, PRIOR, np.random.default_rng(0))
+    assert found == pytest.approx(np.log(total / n_automata), abs=0.05)
+
+
+def owned_trials(rng):
+    """Two objects of one label a state, each moved by an automaton of its own, twelve trials in turn."""
+    automata = [np.array([[1, 2, 0], [1, 0, 2]]), np.array([[2, 2, 1], [0, 1, 0]])]
+    labels = np.zeros((12, 8, 1), dtype=np.int64)
+    actions = rng.integers(2, size=(12, 8))
+    for trial in range(12):
+        state = rng.integers(3)
+        for time in range(8):
+            labels[trial, time, 0] = ((0, 1, 2), (3, 4, 5))[trial % 2][state]
+            state = automata[trial % 2][actions[trial, time], state]
+    return Recording(labels, np.full(labels.shape, np.nan), actions, np.full(12, 8), 6)
+
+
+def test_objects_that_share_nothing_get_automata_of_their_own():
+    rng = np.random.default_rng(14)
+    recording = owned_trials(rng)
+    task = Task.of(recording, DetectorNoise.unknown(6), 2)
+    trials = TrialArrays(task.looks, recording.actions, recording.lengths)
+    prior = np.full(6, 1 / 6)
+    log_own = [gibbs_kernels.own_log_evidence(trials, trial, 3, 2, prior, rng) for trial in range(12)]
+    task = task._replace(log_own=np.array(log_own))
+    chain = Chain(Structure(rng.integers(3, size=(2, 3)), np.array([[0], [1], [2]]), 3), 0.0, 6, may_own=True)
+    chain.admit(task)
+    chain.scatter(rng)
+    chain.log_joint(task)
+    for beta in (*np.geomspace(0.1, 1.0, 30), *np.ones(10)):
+        chain.sweep(task, rng, beta, automaton=True)
+    owner = chain.clusters.owner
+    assert len({*owner[::2]}) == len({*owner[1::2]}) == 1
+    assert owner[0] != owner[1]
+    # One may keep the shared automaton for itself; the other has its own.
+    assert len(chain.own_automata) >= 1

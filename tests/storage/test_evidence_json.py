@@ -83,7 +83,11 @@ def test_a_file_without_what_was_sampled_is_sampled_again(learned):
     document = memory_to_document(memory)
     del document["structure"]["evidence"]
     loaded = memory_from_document(json.loads(json.dumps(document, default=float)))
-    names = {name for belief in loaded.evidence.believed(loaded.names) for name in np.flatnonzero(belief.is_there)}
+    names = {
+        name
+        for belief in loaded.evidence.believed(loaded.names)
+        for name in np.flatnonzero(np.isfinite(belief.log_prior))
+    }
     assert names
 
 
