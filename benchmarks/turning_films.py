@@ -22,9 +22,12 @@ from sim.bodies.cube import TAG_SIZE, face_image
 from sim.vision.turning_film import TurningFilm, Webcam
 
 N_ACTIONS = 10
+REST = 1.8  # s: a person waits until the look is told, which takes longer if one of the tags cannot be read
 USUAL = Webcam()
 CONDITIONS = {
     "usual": (USUAL, 8.0),
+    "from 30 degrees": (replace(USUAL, pitch=30.0), 8.0),
+    "from 60 degrees": (replace(USUAL, pitch=60.0), 8.0),
     "hard": (
         replace(USUAL, noise=12.0, exposure=0.9, light_period=2.0, distortion=(-0.35, 0.12, 0.002, -0.002, 0)),
         16.0,
@@ -34,7 +37,7 @@ CONDITIONS = {
 
 def main() -> None:
     """Print the table."""
-    n_films = int(sys.argv[1]) if len(sys.argv) > 1 else 10
+    n_films = int(sys.argv[1]) if len(sys.argv) > 1 else 6
     table = Table(title=f"{n_films} films of {N_ACTIONS} turns, seeds 0 to {n_films - 1}", title_justify="left")
     for heading in ("condition", "turns right", "95% interval", "looks with both tags"):
         table.add_column(heading, justify="right")
@@ -54,7 +57,7 @@ def _film(webcam: Webcam, askew: float, seed: int) -> tuple[int, int, int]:
     detector = TagDetector(Tags("5X5_50", TAG_SIZE, webcam.intrinsics, np.array(webcam.distortion), symbols))
     watcher = TurnWatcher(ACTION_ROTATIONS)
     actions = np.random.default_rng(seed).choice(list(ACTION_ROTATIONS), N_ACTIONS).tolist()
-    film = TurningFilm([[face_image(tag) for tag in symbols]], webcam, seed, askew=askew)
+    film = TurningFilm([[face_image(tag) for tag in symbols]], webcam, seed, askew=askew, rest=REST)
     rests = []
     for number, frame in enumerate(film.frames(0, actions)):
         said = watcher.take(number / webcam.rate, detector.detect(frame))

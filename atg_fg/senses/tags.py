@@ -165,13 +165,24 @@ class TagPose:
         position: Of its middle, shape [3], m, in the camera's frame (x right, y down, z forward) unless it was moved.
         rotation: From the tag's frame (x right, y up, z its normal) to that frame, shape [3, 3].
         corner_error: How far the corners lie from where the pose would have them, root of the mean square, pixels.
-        ambiguity: Error of this pose over that of the other one that shows a square alike, 0 (clear) to 1.
+        other_rotation: Of the other pose that shows a square much alike, shape [3, 3]; ``None`` if there is none.
+        ambiguity: Error of this pose over that of the other one, 0 (clear) to 1.
     """
 
     position: FloatArray
     rotation: FloatArray
     corner_error: float = 0.0
+    other_rotation: FloatArray | None = None
     ambiguity: float = 0.0
+
+    def moved(self, rotation: FloatArray, translation: FloatArray) -> TagPose:
+        """Return the pose in another frame: x becomes ``rotation @ x + translation``."""
+        return replace(
+            self,
+            position=np.asarray(rotation @ self.position + translation),
+            rotation=rotation @ self.rotation,
+            other_rotation=None if self.other_rotation is None else rotation @ self.other_rotation,
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -221,9 +232,7 @@ class DetectedTag:
 
     def moved(self, rotation: FloatArray, translation: FloatArray) -> DetectedTag:
         """Return the tag with its pose in another frame: x becomes ``rotation @ x + translation``."""
-        pose = self._posed
-        position = np.asarray(rotation @ pose.position + translation)
-        return replace(self, pose=replace(pose, position=position, rotation=rotation @ pose.rotation))
+        return replace(self, pose=self._posed.moved(rotation, translation))
 
 
 class TagDetector:
@@ -231,15 +240,18 @@ class TagDetector:
 
     Args:
         tags: Which tags, and through which camera.
+        apart: Squares that lie closer together than this share of their perimeter are taken for one. The border of a
+            face must not be taken for that of the tag on it.
     """
 
-    def __init__(self, tags: Tags) -> None:
+    def __init__(self, tags: Tags, *, apart: float = 0.05) -> None:
         self.tags = tags
         self._dictionary = _dictionary(tags.dictionary)
         parameters = cv2.aruco.DetectorParameters()
         # Lines fitted to a tag's sides: sub-pixel search strays on a foreshortened face (p95 of a cube's centre 14 mm,
         # against 6 mm).
         parameters.cornerRefinementMethod = cv2.aruco.CORNER_REFINE_CONTOUR
+        parameters.minMarkerDistanceRate = apart
         self._detector = cv2.aruco.ArucoDetector(self._dictionary, parameters)
         half = tags.size / 2
         self._square = half * np.array([[-1, 1, 0], [1, 1, 0], [1, -1, 0], [-1, -1, 0]], dtype=np.float32)
@@ -288,10 +300,11 @@ class TagDetector:
         _, rotations, translations, errors = cv2.solvePnPGeneric(
             self._square, corners, intrinsics, self._distortion, flags=cv2.SOLVEPNP_IPPE_SQUARE
         )
-        first, *others = np.ravel(errors).tolist()
-        ambiguity = min(1.0, first / others[0]) if others and others[0] > 0 else 1.0
-        rotation = np.asarray(cv2.Rodrigues(rotations[0])[0], dtype=np.float64)
-        return replace(tag, pose=TagPose(np.ravel(translations[0]), rotation, first, ambiguity))
+        first, *second = np.ravel(errors).tolist()
+        ambiguity = min(1.0, first / second[0]) if second and second[0] > 0 else 1.0
+        rotation, *others = (np.asarray(cv2.Rodrigues(each)[0], dtype=np.float64) for each in rotations)
+        other = others[0] if others else None
+        return replace(tag, pose=TagPose(np.ravel(translations[0]), rotation, first, other, ambiguity))
 
     def _whiteness(self, grey: NDArray[np.uint8], corners: NDArray[Any]) -> FloatArray:
         """Return the share of white in each inner cell, from a picture of the tag seen straight on."""

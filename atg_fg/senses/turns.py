@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final
 
 import numpy as np
@@ -24,6 +24,13 @@ CUBE_ROTATIONS: Final[FloatArray] = np.array(
         if np.linalg.det(matrix := np.diag(signs)[list(places)]) > 0
     ]
 )
+
+#: Error of a pose over that of the other one that shows a tag alike, up to which the other one is out of question.
+_CLEAR: Final = 0.3
+#: What speaks against the other pose if its error is far larger; it has to be so many degrees straighter.
+_UNLIKELY: Final = 60.0
+#: How straight tags are on the faces of a cube, as far as can be measured, degrees.
+_GLUED: Final = 15.0
 
 
 def nearest_rotation(rotation: FloatArray) -> tuple[int, float]:
@@ -109,6 +116,7 @@ class TurnWatcher:
         self._still_since = math.inf
         self._last_seen: float | None = None
         self._on_cube: dict[int, FloatArray] = {}
+        self._turned: FloatArray | None = None
         self._stood: int | None = None
         self._reported = False
 
@@ -162,9 +170,11 @@ class TurnWatcher:
             return None
         if self._viewpoint_is_guessed and (found := Viewpoint.of_tags(tags)) is not None:
             self.viewpoint, self._viewpoint_is_guessed = found, False
+        tags = [self._straightened(tag) for tag in tags]
         slots = self.viewpoint.slots(tags)
         if None in slots.values() and since < self.patience.hidden:
             return None
+        self._note_places(tags, stands=True)
         stands = self._standing(tags)
         is_strange = not any(tag.id in self._on_cube for tag in tags)
         if is_strange and any(tag is not None for tag in slots.values()):
@@ -182,38 +192,86 @@ class TurnWatcher:
         self._reported, self._stood = True, stands
         return None if again else CubeAtRest(slots, turn)
 
-    def _note_places(self, tags: Sequence[DetectedTag]) -> None:
-        """Note how tags that are seen for the first time sit on the cube, by one that is known."""
+    def _straightened(self, tag: DetectedTag) -> DetectedTag:
+        """Return the tag in that of its poses, if both are likely, in which it faces straight to a side or up."""
+        if _ambiguity(tag) < _CLEAR:
+            return tag
+        axes = self.viewpoint.axes
+        straightest, _ = min(_rotations(tag), key=lambda each: _straight(axes @ each[0])[0] + each[1])
+        assert tag.pose is not None
+        return replace(tag, pose=replace(tag.pose, rotation=straightest))
+
+    def _note_places(self, tags: Sequence[DetectedTag], *, stands: bool = False) -> None:
+        """Note how tags that are seen for the first time sit on the cube, by those that are known.
+
+        While the cube is being turned, only what is seen clearly counts; when it stands, the table tells poses apart.
+        """
         if not self._on_cube:
-            self._on_cube[_clearest(tags).id] = np.eye(3)
-        cube = self._cube_rotation(tags)
-        if cube is None:
+            self._on_cube[min(tags, key=_ambiguity).id] = np.eye(3)
+        known = [tag for tag in tags if tag.id in self._on_cube]
+        cube = self._cube_rotation(tags, stands=stands)
+        if cube is None or not (stands or min(map(_ambiguity, known)) < _CLEAR):
             return
         for tag in tags:
-            if tag.id not in self._on_cube and tag.pose is not None and tag.pose.ambiguity < 0.5:
-                place, off = nearest_rotation(cube.T @ tag.rotation)
-                if off < self.patience.skew:
+            if tag.id not in self._on_cube and (stands or _ambiguity(tag) < _CLEAR):
+                # Of the two poses that show the tag alike, that in which it sits straight on the cube.
+                (off, place), *others = sorted(_straight(cube.T @ rotation) for rotation, _ in _rotations(tag))
+                if off < _GLUED and all(place == other or apart > 2 * off for apart, other in others):
                     self._on_cube[tag.id] = CUBE_ROTATIONS[place]
 
-    def _cube_rotation(self, tags: Sequence[DetectedTag]) -> FloatArray | None:
-        """Return the rotation from the cube's frame, that of the tag seen first, to the camera's."""
-        known = [tag for tag in tags if tag.id in self._on_cube]
+    def _cube_rotation(self, tags: Sequence[DetectedTag], *, stands: bool = False) -> FloatArray | None:
+        """Return the rotation from the cube's frame, that of the tag seen first, to the camera's.
+
+        Of the poses that each tag allows, those are taken that agree best: with each other, with the table if the cube
+        stands on it, or else with how it was turned a moment ago.
+        """
+        known = sorted((tag for tag in tags if tag.id in self._on_cube), key=_ambiguity)
         if not known:
             return None
-        best = _clearest(known)
-        return np.asarray(best.rotation @ self._on_cube[best.id].T)
+        allowed = [[(rotation @ self._on_cube[tag.id].T, cost) for rotation, cost in _rotations(tag)] for tag in known]
+
+        def disagreement(cube: FloatArray) -> float:
+            total = sum(min(_angle(cube, each) + cost for each, cost in rotations) for rotations in allowed)
+            if stands:
+                total += _straight(self.viewpoint.axes @ cube)[0]
+            elif self._turned is not None and len(known) == 1 and _ambiguity(known[0]) > _CLEAR:
+                total += _angle(cube, self._turned)
+            return total
+
+        self._turned = min((cube for rotations in allowed for cube, _ in rotations), key=disagreement)
+        return self._turned
 
     def _standing(self, tags: Sequence[DetectedTag]) -> int | None:
         """Return which of the 24 rotations the cube stands in on the table, ``None`` if it is aslant or unknown."""
-        cube = self._cube_rotation(tags)
+        cube = self._cube_rotation(tags, stands=True)
         if cube is None:
             return None
-        stands, off = nearest_rotation(self.viewpoint.axes @ cube)
+        off, stands = _straight(self.viewpoint.axes @ cube)
         return stands if off < self.patience.skew else None
 
 
-def _clearest(tags: Sequence[DetectedTag]) -> DetectedTag:
-    return min(tags, key=lambda tag: 1.0 if tag.pose is None else tag.pose.ambiguity)
+def _ambiguity(tag: DetectedTag) -> float:
+    return 1.0 if tag.pose is None else tag.pose.ambiguity
+
+
+def _rotations(tag: DetectedTag) -> list[tuple[FloatArray, float]]:
+    """Return the rotations of a tag that show it much alike, each with what speaks against it, in degrees."""
+    assert tag.pose is not None
+    likelier = [(tag.pose.rotation, 0.0)]
+    if tag.pose.other_rotation is None:
+        return likelier
+    return [*likelier, (tag.pose.other_rotation, _UNLIKELY * (1 - tag.pose.ambiguity))]
+
+
+def _angle(one: FloatArray, other: FloatArray) -> float:
+    """Return the angle between two rotations, degrees."""
+    return math.degrees(math.acos(np.clip(((one * other).sum() - 1) / 2, -1, 1)))
+
+
+def _straight(rotation: FloatArray) -> tuple[float, int]:
+    """Return how far a rotation is from the nearest of ``CUBE_ROTATIONS``, degrees, and which that is."""
+    nearest, off = nearest_rotation(rotation)
+    return off, nearest
 
 
 def _composed(after: int, before: int) -> int:

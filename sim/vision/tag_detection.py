@@ -22,7 +22,9 @@ SLOT_DIRECTIONS: Final = {"front": np.array([-1.0, 0.0, 0.0]), "top": np.array([
 
 @lru_cache(maxsize=8)
 def _detector(lens: Camera) -> TagDetector:
-    return TagDetector(Tags(TAG_DICTIONARY, TAG_SIZE, lens.intrinsics, symbols={tag: tag for tag in range(N_TAGS)}))
+    tags = Tags(TAG_DICTIONARY, TAG_SIZE, lens.intrinsics, symbols={tag: tag for tag in range(N_TAGS)})
+    # OpenCV's own value: what was measured of the simulated robot was measured with it.
+    return TagDetector(tags, apart=0.125)
 
 
 def detect_markers(frame: NDArray[np.uint8], camera: Camera) -> list[DetectedTag]:

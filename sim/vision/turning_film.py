@@ -26,6 +26,8 @@ from sim.vision.camera import Camera, Light
 
 #: A film's formats by the suffix of its file.
 CODECS: Final = {".avi": "MJPG", ".mp4": "mp4v"}
+#: While nothing but the light moves, it is rendered anew once in so many frames.
+_FRAMES_A_SHOT: Final = 3
 _SKIN: Final = [0.85, 0.63, 0.50, 1.0]
 _AWAY: Final = np.array([0.0, 5.0, 0.0])  # where a hand is that is not needed
 
@@ -165,8 +167,11 @@ class TurningFilm:
     def _still(self, cube: int, place: FloatArray, rotation: FloatArray, seconds: float) -> Iterator[NDArray[np.uint8]]:
         self._cubes[cube].place(place, rotation)
         self._hide_hand()
-        for _ in range(round(seconds * self.webcam.rate)):
-            yield self._frame()
+        shot = self._shot()
+        for number in range(round(seconds * self.webcam.rate)):
+            if number % _FRAMES_A_SHOT == _FRAMES_A_SHOT - 1:
+                shot = self._shot()
+            yield self._finished(shot)
 
     def _turned(
         self, cube: int, action: str, begin: tuple[FloatArray, FloatArray], goal: FloatArray
@@ -206,9 +211,6 @@ class TurningFilm:
         self._hide_hand()
         for body in self._cubes:
             body.place(_AWAY, np.eye(3))
-
-    def _frame(self) -> NDArray[np.uint8]:
-        return self._finished(self._shot())
 
     def _shot(self) -> NDArray[np.uint8]:
         angle = 2 * np.pi * self._time / self.webcam.light_period

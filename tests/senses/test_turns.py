@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -12,6 +14,8 @@ from tests.senses.images import turned
 
 UPS = np.array([[0, 0, 1]] * 4 + [[1, 0, 0], [-1, 0, 0]], dtype=float)
 PITCH = 40.0
+#: So steep that no pose taken for its other one looks straight on the table by chance.
+STEEP = Viewpoint.pitched(65.0)
 
 
 def frame(cube, view=None, offset=0.0, hidden=()):
@@ -127,6 +131,41 @@ def test_a_cube_put_down_askew_is_noticed_all_the_same(yaws):
         straight = ACTION_ROTATIONS[action] @ straight
         film.show(frame(turned([0, 0, 1], yaw) @ straight, offset=200), 1)
     assert [rest.turn for rest in film.said] == [(), ("left",), ("flip",)]
+
+
+def mirrored(tag):
+    """The tag with its pose and the one that shows it much alike exchanged, as noise may do it."""
+    pose = tag.pose
+    view = np.array(pose.position) / np.linalg.norm(pose.position)
+    across = np.cross(view, pose.rotation[:, 2])
+    slant = np.degrees(np.arcsin(min(1.0, np.linalg.norm(across))))
+    other = turned(across / np.linalg.norm(across), 2 * slant) @ pose.rotation
+    return replace(tag, pose=replace(pose, rotation=other, other_rotation=pose.rotation, ambiguity=0.9))
+
+
+@given(actions=st.lists(st.sampled_from(list(ACTION_ROTATIONS)), min_size=1, max_size=6), place=st.sampled_from([0, 1]))
+def test_a_pose_taken_for_the_other_one_that_shows_the_tag_alike_misleads_nobody(actions, place):
+    watcher = TurnWatcher(ACTION_ROTATIONS, STEEP)
+    said, time, cube = [], 0.0, np.eye(3)
+    for action in (None, *actions):
+        cube = cube if action is None else ACTION_ROTATIONS[action] @ cube
+        tags = frame(turned([0, 0, 1], 7) @ cube, STEEP, offset=100 * time)
+        if action is not None:
+            tags[place] = mirrored(tags[place])
+        for _ in range(20):
+            said.append(watcher.take(time, tags))
+            time += 0.1
+    turns = [each.turn for each in said if each is not None]
+    # It is noticed right, or it is not known; never is it noticed wrong.
+    known = [(action,) for action in actions]
+    assert len(turns) == len(actions) + 1
+    assert all(turn in (None, expected) for turn, expected in zip(turns[1:], known, strict=True))
+    assert turns[1] == known[0]
+    faces = FACE_NORMALS @ cube.T
+    assert symbols([each for each in said if each is not None][-1]) == (
+        int((faces @ [-1, 0, 0]).argmax()),
+        int((faces @ [0, 0, 1]).argmax()),
+    )
 
 
 def test_two_turns_at_once_are_the_actions_that_they_are_worth(film):
