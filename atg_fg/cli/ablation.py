@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
-from rich.table import Table
 
 from atg_fg.cli import options
-from atg_fg.cli.experiments import parse_actions, success_with_interval
+from atg_fg.cli.experiments import parse_actions
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.display import figures
 from atg_fg.display.success_plots import plot_ablation
 from atg_fg.experiments.ablation import NOISES, VARIANTS, AblationLog, Cell, run_ablation, summarise_ablation
+from atg_fg.experiments.document_tables import tables_of
 from atg_fg.storage import plain_files
 from atg_fg.worlds.registry import WORLDS
 
@@ -60,15 +60,14 @@ def ablation(
         results = run_ablation(cells, seeds, trials, kept, workers, advance, executor)
     entries = summarise_ablation(results)
     parameters = {"tests": tests, "trials": trials, "seed": seed}
-    options.write_json({"command": "ablation", "parameters": parameters, "cells": entries}, json_file)
+    document = {"command": "ablation", "parameters": parameters, "cells": entries}
+    options.write_json(document, json_file)
     if plot is not None:
         figures.save_figure(plot_ablation(entries), plot)
     if json_file != "-":
-        for world, noise in dict.fromkeys((entry["world"], entry["noise"]) for entry in entries):
-            chosen = [entry for entry in entries if (entry["world"], entry["noise"]) == (world, noise)]
-            options.console().print(
-                _table(f"Success, {world} world, {noise}, {tests} tests of {trials} trials", chosen)
-            )
+        places = dict.fromkeys((each["world"], each["noise"]) for each in entries)
+        titles = [f"Success, {world} world, {noise}, {tests} tests of {trials} trials" for world, noise in places]
+        options.print_tables(tables_of(document), *titles)
 
 
 def _chosen(option: str, text: str, known: tuple[str, ...], separator: str) -> list[str]:
@@ -87,15 +86,3 @@ def _chosen(option: str, text: str, known: tuple[str, ...], separator: str) -> l
     if len(set(names)) < len(names):
         raise InvalidInputError(f"{option}: {text!r}; expected each name once")
     return names
-
-
-def _table(title: str, entries: list[dict[str, Any]]) -> Table:
-    table = Table(title=title, title_justify="left")
-    table.add_column("Actions", justify="right")
-    variants = list(dict.fromkeys(entry["variant"] for entry in entries))
-    for variant in variants:
-        table.add_column(variant, justify="right")
-    cells = {(entry["actions"], entry["variant"]): entry for entry in entries}
-    for number in dict.fromkeys(entry["actions"] for entry in entries):
-        table.add_row(str(number), *(success_with_interval(cells[number, variant]) for variant in variants))
-    return table

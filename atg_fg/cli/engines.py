@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated, Any
+from typing import Annotated
 
 import typer
-from rich.table import Table
 
 from atg_fg.cli import options
 from atg_fg.cli.terminal import say
 from atg_fg.core.errors import unknown_name
 from atg_fg.engines import ENGINES
 from atg_fg.experiments import calibration, engine_comparison
+from atg_fg.experiments.document_tables import tables_of
 from atg_fg.storage.presets import preset as preset_named
 
 app = typer.Typer(
@@ -56,31 +56,11 @@ def compare(
         summary = engine_comparison.summarise(engine_comparison.compare(plan, names, seed, advance))
     parameters = {"trials": trials, "objects": objects, "remembered": remembered, "actions": actions, "preset": preset}
     parameters |= {"slip": slip, "wrong": wrong, "missing": missing, "seed": seed}
-    options.write_json({"command": "compare", "parameters": parameters, "engines": summary}, json_file)
+    document = {"command": "compare", "parameters": parameters, "engines": summary}
+    options.write_json(document, json_file)
     if json_file != "-":
         title = f"{trials} trials of {actions} actions, {remembered} of {objects} objects remembered, preset {preset}"
-        options.console().print(_comparison_table(title, summary))
-
-
-def _comparison_table(title: str, summary: dict[str, Any]) -> Table:
-    table = Table(title=title, title_justify="left")
-    for heading in ("engine", "exact", "total variation, mean", "worst", "same decision", "time, as a ratio"):
-        table.add_column(heading, justify="left" if heading in ("engine", "exact") else "right")
-    for name, entry in summary.items():
-        if entry["refused"] is not None:
-            table.add_row(name, "yes" if entry["exact"] else "no", "-", "-", "-", "too large")
-            continue
-        distance, same, ratio = entry["total_variation"], entry["same_decision"], entry["time_ratio"]
-        low, high = same["interval95"]
-        table.add_row(
-            name,
-            "yes" if entry["exact"] else "no",
-            f"{distance['mean']:.2g}",
-            f"{distance['worst']:.2g}",
-            f"{100 * same['rate']:.1f}% ({100 * low:.1f}-{100 * high:.1f})",
-            f"{ratio['median']:.3g} ({ratio['quartiles'][0]:.3g}-{ratio['quartiles'][1]:.3g})",
-        )
-    return table
+        options.print_tables(tables_of(document), title)
 
 
 @app.command()
@@ -101,16 +81,11 @@ def check(
     with options.progress_bar("trials", trials) as advance:
         summary = calibration.summarise(calibration.run_calibration(engine, plan, seed, advance))
     parameters = {"engine": engine, "trials": trials, "seed": seed}
-    options.write_json({"command": "calibrate", "parameters": parameters, **summary}, json_file)
+    document = {"command": "calibrate", "parameters": parameters, **summary}
+    options.write_json(document, json_file)
     if json_file != "-":
         test = summary["chi_square"]
-        table = Table(title=f"{engine}: {trials} trials drawn from the model, seed {seed}", title_justify="left")
-        for heading in ("probability given", "times", "mean", "share that was true"):
-            table.add_column(heading, justify="right")
-        for each in summary["reliability"]:
-            tenth = f"{each['from']:.1f}-{each['from'] + 0.1:.1f}"
-            table.add_row(tenth, str(each["count"]), f"{each['predicted']:.3f}", f"{each['found']:.3f}")
-        options.console().print(table)
+        options.print_tables(tables_of(document), f"{engine}: {trials} trials drawn from the model, seed {seed}")
         say(f"reliability error: {summary['reliability_error']:.4f}")
         say(
             f"averaged posterior = prior: chi-square {test['statistic']:.2f}, {test['degrees_of_freedom']} degrees of "

@@ -15,10 +15,12 @@ from atg_fg.cli import options
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.display import figures
 from atg_fg.display.success_plots import plot_success
+from atg_fg.experiments.document_tables import tables_of
 from atg_fg.experiments.figure3 import Figure3Log, figure3_points
 from atg_fg.experiments.scores import TestResult, actions_a_trial, summarise
 from atg_fg.experiments.table1 import TestPlan, run_tests
 from atg_fg.storage import memory_files, plain_files
+from atg_fg.storage.checked_json import without_none
 from atg_fg.storage.presets import preset as preset_named
 from atg_fg.worlds.registry import ARCUBE_WORLDS
 
@@ -138,9 +140,13 @@ def table1(
         "wrong": wrong,
         "missing": missing,
         **world_options,
-        **({"smoothed_learning": True} if smoothed_learning else {}),
-        **({} if settled is None else {"settled": settled}),
-        **({"merge_duplicates": True} if merge_duplicates else {}),
+        **without_none(
+            {
+                "smoothed_learning": smoothed_learning or None,
+                "settled": settled,
+                "merge_duplicates": merge_duplicates or None,
+            }
+        ),
     }
     options.write_json({"command": "table1", "parameters": parameters, **summary}, json_file)
     if json_file != "-":
@@ -247,14 +253,15 @@ def figure3(
         "wrong": wrong,
         "missing": missing,
     }
-    options.write_json({"command": "figure3", "parameters": parameters, "points": points}, json_file)
+    document = {"command": "figure3", "parameters": parameters, "points": points}
+    options.write_json(document, json_file)
     if csv_file is not None:
         plain_files.write_bytes_atomically(csv_file, _csv(points).encode())
     if plot is not None:
         figures.save_figure(plot_success(points, title=f"Figure 3: {world} world, preset {preset}"), plot)
     if json_file != "-":
         title = f"Figure 3: success, {world} world, preset {preset}, {tests} tests of {trials} trials"
-        options.console().print(_figure3_table(title, points))
+        options.print_tables(tables_of(document), title)
 
 
 def parse_actions(text: str) -> list[int]:
@@ -285,20 +292,3 @@ def _csv(points: list[dict[str, Any]]) -> str:
         row = [point[key] for key in ("actions", "policy", "success")]
         writer.writerow([*row, *point["interval95"], point["standard_error"], point["tests"]])
     return text.getvalue()
-
-
-def _figure3_table(title: str, points: list[dict[str, Any]]) -> Table:
-    table = Table(title=title, title_justify="left")
-    table.add_column("Actions", justify="right")
-    for policy in FIGURE3_POLICIES:
-        table.add_column(f"{policy} policy", justify="right")
-    cells = {(point["actions"], point["policy"]): point for point in points}
-    for number in dict.fromkeys(point["actions"] for point in points):
-        table.add_row(str(number), *(success_with_interval(cells[number, policy]) for policy in FIGURE3_POLICIES))
-    return table
-
-
-def success_with_interval(point: dict[str, Any]) -> str:
-    """Return the success rate of a point of an experiment with its 95 % interval, as tables show it."""
-    low, high = point["interval95"]
-    return f"{_percent(point['success'])} ({100 * low:.1f}-{100 * high:.1f})"

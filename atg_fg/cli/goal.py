@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Annotated, Any, Final
 
 import typer
-from rich.table import Table
 
 from atg_fg.cli import options
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.display import figures
+from atg_fg.experiments.document_tables import tables_of
 from atg_fg.experiments.goal_scores import summarise
 from atg_fg.experiments.goals import COMPLETE, GoalPlan, run_goals, run_many, run_seed
 from atg_fg.policies import POLICIES
@@ -147,10 +147,11 @@ def goal(
         "seed": seed,
         **world_options,
     }
-    options.write_json({"command": "goal", "parameters": parameters, **summary}, json_file)
+    document = {"command": "goal", "parameters": parameters, **summary}
+    options.write_json(document, json_file)
     if json_file != "-":
         title = f"{trials} runs, {cubes} of {memory_cubes} cubes, {world} world, preset {preset}, engine {engine}"
-        options.console().print(_table(title, summary))
+        options.print_tables(tables_of(document), title)
 
 
 def _film(plan: GoalPlan, seed: int, path: Path) -> None:
@@ -166,36 +167,3 @@ def _film(plan: GoalPlan, seed: int, path: Path) -> None:
     filmed = replace(plan, world_options={**plan.world_options, "render_mode": RENDER_MODES[plan.world]})
     run_goals(filmed, run_seed(seed, 0), on_look=take)
     figures.save_film(pictures, rates[0], path)
-
-
-def _table(title: str, summary: dict[str, Any]) -> Table:
-    table = Table(title=title, title_justify="left")
-    for heading in ("", "count", "rate", "95% interval"):
-        table.add_column(heading, justify="left" if not heading else "right")
-    rates = {
-        "goals reached": "reached",
-        "goals that the memory had a path to": "reachable",
-        "  of these reached": "reached_of_reachable",
-        "goals without a known path, declared so": "declared_of_unreachable",
-        "runs in which all goals with a path were reached": "runs_with_all_reachable_reached",
-        "reached, as the robot says, but not shown": "wrong_success",
-        "cubes taken for another or for a new one": "wrong_object",
-        "ways to the goal as short as can be": "optimal",
-    }
-    for label, name in rates.items():
-        rate = summary[name]
-        low, high = rate["interval95"]
-        share = "-" if rate["rate"] is None else f"{100 * rate['rate']:.1f}%"
-        table.add_row(label, f"{rate['count']}/{rate['of']}", share, f"{100 * low:.1f}-{100 * high:.1f}%")
-    table.add_section()
-    numbers = {
-        "actions to recognise, mean": "recognition_actions",
-        "actions to a goal reached, mean": "goal_actions",
-        "fewest possible, mean": "optimum",
-        "goals for which the actions ran out": "exhausted",
-        "cubes lost": "lost",
-    }
-    for label, name in numbers.items():
-        value = summary[name]
-        table.add_row(label, "-" if value is None else f"{value:.2f}" if isinstance(value, float) else str(value))
-    return table

@@ -5,17 +5,20 @@ from __future__ import annotations
 import json
 import os
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from itertools import zip_longest
 from pathlib import Path
 from typing import Annotated, Any
 
+import rich.table
 import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from atg_fg.cli.terminal import PlainConsole
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.table import Table
 from atg_fg.engines import ENGINES, usual_engine
 from atg_fg.experiments.executors.base import EXECUTORS, check_executor, is_cluster
 from atg_fg.policies import POLICIES, check_entropy_threshold
@@ -193,6 +196,17 @@ def write_json(document: dict[str, Any], path: str | None) -> None:
 def console(json_path: str | None = None) -> PlainConsole:
     """Return where tables go: standard output, or standard error if that is taken by JSON."""
     return PlainConsole(stderr=json_path == "-")
+
+
+def print_tables(tables: Iterable[Table], *titles: str) -> None:
+    """Print tables on standard output, the first ones with other titles if any are given."""
+    for table, title in zip_longest(tables, titles):
+        shown = rich.table.Table(title=title or table.title, title_justify="left", caption=table.note or None)
+        for number, heading in enumerate(table.headings):
+            shown.add_column(heading, justify="right" if number else "left")
+        for row in table.rows:
+            shown.add_row(*map(str, row))
+        console().print(shown)
 
 
 @contextmanager

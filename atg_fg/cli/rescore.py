@@ -6,10 +6,10 @@ from pathlib import Path
 from typing import Annotated
 
 import typer
-from rich.table import Table
 
 from atg_fg.cli import options
 from atg_fg.engines import check_engine
+from atg_fg.experiments.document_tables import tables_of
 from atg_fg.experiments.rescore import rescore as judged_anew
 from atg_fg.experiments.scores import pooled_interval
 from atg_fg.storage.presets import preset as preset_named
@@ -47,13 +47,4 @@ def rescore(
     document = {"command": "rescore", "parameters": {"preset": preset, "engine": engine}, "tests": tests}
     options.write_json(document, json_file)
     if json_file != "-":
-        table = Table(title=f"Recorded tests, judged with preset {preset}, engine {engine}", title_justify="left")
-        for heading in ("Test", "Correct identification", "Correct recognition", "Success rate"):
-            table.add_column(heading, justify="left" if heading == "Test" else "right")
-        for file, result in results.items():
-            name = f"{Path(file).parent.name}\n{Path(file).name.removesuffix('.jsonl.gz')}"
-            low, high = pooled_interval([result], "success")
-            rate = f"{100 * result.success[0] / result.success[1]:.0f}% ({100 * low:.1f}-{100 * high:.1f})"
-            counts = (f"{right}/{total}" for right, total in (result.identification, result.recognition))
-            table.add_row(name, *counts, rate)
-        options.console().print(table)
+        options.print_tables(tables_of(document), f"Recorded tests, judged with preset {preset}, engine {engine}")

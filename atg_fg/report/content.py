@@ -8,6 +8,7 @@ from typing import Any, TypeAlias
 
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.patterns import Detection
+from atg_fg.core.table import Table
 
 #: (name, value) pairs in the order in which they are shown.
 Named: TypeAlias = tuple[tuple[str, float], ...]
@@ -87,15 +88,6 @@ class TrialPage:
     looks: tuple[Look, ...]
     graphs: tuple[PlacedGraph, ...]
     goal: Detection | None = None
-
-
-@dataclass(frozen=True)
-class Table:
-    """A table; the first column names the rows."""
-
-    title: str
-    columns: tuple[str, ...]
-    rows: tuple[tuple[str, ...], ...]
 
 
 @dataclass(frozen=True)

@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Final, TypeAlias
 
-from atg_fg.core.checks import number, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.statistics import wilson_interval
-from atg_fg.report.content import Plot, Point, Report, Series, Table, shown_parameters
+from atg_fg.experiments.document_tables import (
+    ACTIONS,
+    SUCCESS,
+    action_rates,
+    curve_numbers,
+    detection_rates,
+    goal_rates,
+    per_cent,
+    places_of,
+    tables_of,
+)
+from atg_fg.report.content import Plot, Point, Report, Series, shown_parameters
 from atg_fg.storage.checked_json import read_info
 
-_Views: TypeAlias = tuple[list[Table], list[Plot]]
-
-_SUCCESS: Final = "success, %"
-#: That a plot has room for.
-_MOST_ACTIONS: Final = 10**6
-_ACTIONS: Final = "actions a trial"
+_Plots: TypeAlias = Callable[[Mapping[str, Any]], list[Plot]]
 
 
 def read_experiment(document: Mapping[str, Any], place: str) -> Report:
@@ -33,7 +39,7 @@ def read_experiment(document: Mapping[str, Any], place: str) -> Report:
     title, make = EXPERIMENTS[command]
     try:
         read_info(document, place)
-        tables, plots = make(document)
+        tables, plots = tables_of(document), make(document)
         parameters = shown_parameters(document.get("parameters", {}))
     except (KeyError, IndexError, TypeError, ValueError, AttributeError, ZeroDivisionError, OverflowError) as error:
         if isinstance(error, InvalidInputError) and str(error).startswith(place):
@@ -45,202 +51,93 @@ def read_experiment(document: Mapping[str, Any], place: str) -> Report:
     return Report(title, parameters, tables=tuple(tables), plots=tuple(drawn))
 
 
-def _table1(document: Mapping[str, Any]) -> _Views:
-    names = ("identification", "recognition", "success")
-    average, intervals, errors = (document[key] for key in ("average", "interval95", "standard_error"))
-    summary = [(name, _percent(average[name]), _interval(intervals[name]), _percent(errors[name])) for name in names]
+def _table1(document: Mapping[str, Any]) -> list[Plot]:
     tests = document["tests"]
-    rows = [
-        (str(test["seed"]), *(_count(test[name]) for name in names[:2]), _percent(test["success"]), *_endings(test))
-        for test in tests
-    ]
     # In each test the successes are of as many trials as were identified or not.
     points = [
         Point(float(number), *_scaled(_of(round(test["success"] * total), total)), f"seed {test['seed']}")
         for number, (test, total) in enumerate((test, int(test["identification"][1])) for test in tests)
     ]
-    mean = [Point(number, 100 * average["success"]) for number in (-0.4, len(tests) - 0.6)]
-    return (
-        [
-            Table("Averages over tests", ("", "average", "95 % interval", "standard error"), tuple(summary)),
-            Table("Tests", ("seed", "identification", "recognition", "success", "lost", "undecided"), tuple(rows)),
-        ],
-        [
-            Plot(
-                "Success of each test", "seed", _SUCCESS,
-                (Series("a test, 95 % Wilson interval", tuple(points), joined=False), Series("average", tuple(mean))),
-                tuple(str(test["seed"]) for test in tests),
-            )
-        ],
-    )  # fmt: skip
+    mean = [Point(number, per_cent(document["average"]["success"])) for number in (-0.4, len(tests) - 0.6)]
+    series = (Series("a test, 95 % Wilson interval", tuple(points), joined=False), Series("average", tuple(mean)))
+    return [Plot("Success of each test", "seed", SUCCESS, series, tuple(str(test["seed"]) for test in tests))]
 
 
-def _endings(test: Mapping[str, Any]) -> tuple[str, str]:
-    return str(test.get("lost", 0)), str(test.get("undecided", 0))
+def _figure3(document: Mapping[str, Any]) -> list[Plot]:
+    return [_curves("Success rate by number of actions", document["points"], "policy")]
 
 
-def _figure3(document: Mapping[str, Any]) -> _Views:
-    table, plot = _curves("Success rate by number of actions", document["points"], "policy")
-    return [table], [plot]
+def _ablation(document: Mapping[str, Any]) -> list[Plot]:
+    return [_curves(place, cells, "variant") for place, cells in places_of(document["cells"]).items()]
 
 
-def _ablation(document: Mapping[str, Any]) -> _Views:
-    cells = document["cells"]
-    places = dict.fromkeys((cell["world"], cell["noise"]) for cell in cells)
-    tables, plots = [], []
-    for world, noise in places:
-        chosen = [cell for cell in cells if (cell["world"], cell["noise"]) == (world, noise)]
-        table, plot = _curves(f"World {world}, noise {noise}", chosen, "variant")
-        tables.append(table)
-        plots.append(plot)
-    return tables, plots
-
-
-def _curves(title: str, points: Sequence[Mapping[str, Any]], kind: str) -> tuple[Table, Plot]:
-    """Return success over the number of actions, one curve and one column a ``kind``."""
-    names = list(dict.fromkeys(str(point[kind]) for point in points))
+def _curves(title: str, points: Sequence[Mapping[str, Any]], kind: str) -> Plot:
+    """Return success over the number of actions, one curve a ``kind``."""
     found = {(point["actions"], str(point[kind])): point for point in points}
-    numbers = sorted({whole_number(point["actions"], "actions", 1, _MOST_ACTIONS) for point in points})
-    rows = [
-        (str(number), *(_rate_at(found.get((number, name))) for name in names)) for number in numbers
-    ]  # fmt: skip
     series = [
         Series(
             name,
             tuple(
-                Point(float(number), *_scaled((point["success"], point["interval95"])), f"{name}, {number} actions")
-                for number in numbers
-                if (point := found.get((number, name))) is not None
+                Point(float(actions), *_scaled((point["success"], point["interval95"])), f"{name}, {actions} actions")
+                for actions in curve_numbers(points)
+                if (point := found.get((actions, name))) is not None
             ),
         )
-        for name in names
+        for name in dict.fromkeys(str(point[kind]) for point in points)
     ]
-    plot = Plot(title, _ACTIONS, f"{_SUCCESS}, with 95 % Wilson intervals", tuple(series))
-    return Table(title, (_ACTIONS, *names), tuple(rows)), plot
+    return Plot(title, ACTIONS, f"{SUCCESS}, with 95 % Wilson intervals", tuple(series))
 
 
-def _rate_at(point: Mapping[str, Any] | None) -> str:
-    return "–" if point is None else _rate(point["success"], point["interval95"])
+def _goal(document: Mapping[str, Any]) -> list[Plot]:
+    return [_rates(*goal_rates(document))]
 
 
-_GOAL_RATES: Final = {
-    "reached": "goals reached",
-    "reachable": "goals with a known path",
-    "reached_of_reachable": "of these reached",
-    "declared_of_unreachable": "without a known path, declared so",
-    "runs_with_all_reachable_reached": "runs with all known ones reached",
-    "wrong_success": "said to be reached, but not shown",
-    "wrong_object": "taken for another object",
-    "optimal": "ways as short as can be",
-}
-_GOAL_NUMBERS: Final = {
-    "recognition_actions": "actions to recognise, mean",
-    "goal_actions": "actions to a goal reached, mean",
-    "optimum": "fewest possible, mean",
-    "exhausted": "goals for which the actions ran out",
-    "lost": "objects lost",
-}
+def _reliability(document: Mapping[str, Any]) -> list[Plot]:
+    return [_rates(*action_rates(document)), _rates(*detection_rates(document))]
 
 
-def _goal(document: Mapping[str, Any]) -> _Views:
-    numbers = [(label, _number(document[name])) for name, label in _GOAL_NUMBERS.items()]
-    table, plot = _rates(
-        f"{document['runs']} runs, {document['goals']} goals",
-        {label: document[name] for name, label in _GOAL_RATES.items()},
-    )
-    return [table, Table("Numbers", ("", "value"), tuple(numbers))], [plot]
+def _rates(title: str, rates: Mapping[str, Mapping[str, Any]]) -> Plot:
+    """Return counted rates as points with intervals, those that there were any of."""
+    some = {name.replace("_", " "): rate for name, rate in rates.items() if rate["rate"] is not None}
+    found = {name: (rate["rate"], rate["interval95"]) for name, rate in some.items()}
+    return _by_name(title, "", "%", "rate", found)
 
 
-def _reliability(document: Mapping[str, Any]) -> _Views:
-    actions, plot = _rates("Actions that came out right", {"all": document["success"], **document["by_action"]})
-    looks, seen = _rates("Slots detected, of all looks", document["detection"])
-    return [actions, looks], [plot, seen]
+def _compare(document: Mapping[str, Any]) -> list[Plot]:
+    ran = {name: engine["same_decision"] for name, engine in document["engines"].items() if not engine["refused"]}
+    found = {name: (decision["rate"], decision["interval95"]) for name, decision in ran.items()}
+    return [_by_name("Same decision as exact inference", "", "%", "same decision", found)]
 
 
-def _rates(title: str, rates: Mapping[str, Mapping[str, Any]]) -> tuple[Table, Plot]:
-    """Return counted rates as a table, and as points with intervals for those that there were any of."""
-    names = {name.replace("_", " "): rate for name, rate in rates.items()}
-    rows = [
-        (name, f"{rate['count']} of {rate['of']}", _percent(rate["rate"]), _interval(rate["interval95"]))
-        for name, rate in names.items()
-    ]
-    some = {name: rate for name, rate in names.items() if rate["rate"] is not None}
-    points = [
-        Point(float(place), *_scaled((rate["rate"], rate["interval95"])), name)
-        for place, (name, rate) in enumerate(some.items())
-    ]
-    series = Series("rate, 95 % Wilson interval", tuple(points), joined=False)
-    plot = Plot(title, "", "%", (series,), tuple(some))
-    return Table(title, ("", "count", "rate", "95 % interval"), tuple(rows)), plot
-
-
-def _compare(document: Mapping[str, Any]) -> _Views:
-    engines = document["engines"]
-    rows = [(name, *_engine_row(engine)) for name, engine in engines.items()]
-    ran = {name: engine for name, engine in engines.items() if not engine["refused"]}
-    points = [
-        Point(float(place), *_scaled((engine["same_decision"]["rate"], engine["same_decision"]["interval95"])), name)
-        for place, (name, engine) in enumerate(ran.items())
-    ]
-    columns = ("engine", "exact", "total variation, mean / worst", "same decision, %", "time ratio (quartiles)")
-    series = Series("same decision, 95 % Wilson interval", tuple(points), joined=False)
-    return (
-        [Table("Engines on the same trials", columns, tuple(rows))],
-        [Plot("Same decision as exact inference", "", "%", (series,), tuple(ran))],
-    )
-
-
-def _engine_row(engine: Mapping[str, Any]) -> tuple[str, str, str, str]:
-    exact = "yes" if engine["exact"] else "no"
-    if engine["refused"]:
-        return exact, "refused: too large", "–", "–"
-    variation, decision, ratio = engine["total_variation"], engine["same_decision"], engine["time_ratio"]
-    low, high = ratio["quartiles"]
-    return (
-        exact,
-        f"{variation['mean']:.2g} / {variation['worst']:.2g}",
-        _rate(decision["rate"], decision["interval95"]),
-        f"{ratio['median']:.3g} ({low:.3g}–{high:.3g})",
-    )
-
-
-def _rescore(document: Mapping[str, Any]) -> _Views:
+def _rescore(document: Mapping[str, Any]) -> list[Plot]:
     tests = document["tests"]
-    rows = [
-        (
-            test["file"],
-            _count(test["identification"]),
-            _count(test["recognition"]),
-            _rate(test["success"][0] / test["success"][1], test["interval95"]),
-        )
-        for test in tests
+    found = {test["file"]: (test["success"][0] / test["success"][1], test["interval95"]) for test in tests}
+    return [
+        replace(_by_name("Success", "test", SUCCESS, "success", found), categories=tuple(map(str, range(len(tests)))))
     ]
-    points = [
-        Point(float(place), *_scaled((test["success"][0] / test["success"][1], test["interval95"])), test["file"])
-        for place, test in enumerate(tests)
-    ]
-    series = Series("success, 95 % Wilson interval", tuple(points), joined=False)
-    table = Table("Recorded tests", ("test", "identification", "recognition", _SUCCESS), tuple(rows))
-    return [table], [Plot("Success", "test", _SUCCESS, (series,), tuple(str(place) for place in range(len(tests))))]
 
 
-def _calibrate(document: Mapping[str, Any]) -> _Views:
+def _by_name(
+    title: str, x_label: str, y_label: str, what: str, found: Mapping[str, tuple[float, Sequence[float]]]
+) -> Plot:
+    """Return rates with their intervals, each over its name."""
+    points = [Point(float(place), *_scaled(rate), name) for place, (name, rate) in enumerate(found.items())]
+    series = Series(f"{what}, 95 % Wilson interval", tuple(points), joined=False)
+    return Plot(title, x_label, y_label, (series,), tuple(found))
+
+
+def _calibrate(document: Mapping[str, Any]) -> list[Plot]:
     """Show what was found against what was predicted; the diagonal is a calibrated engine."""
-    bins = [each for each in document["reliability"] if each["count"]]
-    rows = [
-        (f"{each['from']:.1f}", str(each["count"]), _percent(each["predicted"]), _percent(each["found"]))
-        for each in bins
-    ]
     points = [
-        Point(100 * each["predicted"], *_scaled(_of(round(each["found"] * each["count"]), each["count"])))
-        for each in bins
+        Point(per_cent(each["predicted"]), *_scaled(_of(round(each["found"] * each["count"]), each["count"])))
+        for each in document["reliability"]
+        if each["count"]
     ]
     series = (
         Series("found, 95 % Wilson interval", tuple(points), joined=False),
         Series("as predicted", (Point(0.0, 0.0), Point(100.0, 100.0))),
     )
-    table = Table("Probabilities and how often they came true", ("from", "count", "predicted", "found"), tuple(rows))
-    return [table], [Plot("Calibration", "predicted, %", "found, %", series)]
+    return [Plot("Calibration", "predicted, %", "found, %", series)]
 
 
 def _of(count: int, total: int) -> tuple[float, tuple[float, float]]:
@@ -250,41 +147,11 @@ def _of(count: int, total: int) -> tuple[float, tuple[float, float]]:
 def _scaled(rate: tuple[float, Sequence[float]]) -> tuple[float, float, float]:
     """Return a rate and the bounds of its interval in per cent."""
     value, (low, high) = rate
-    return _share(value), _share(low), _share(high)
-
-
-def _share(rate: float) -> float:
-    """Return a rate in per cent, or raise ``InvalidInputError`` if it is none."""
-    return 100 * number(rate, "rate", 0.0, 1.0, slack=1e-9)
-
-
-def _percent(rate: float | None) -> str:
-    return "–" if rate is None else f"{_share(rate):.1f} %"
-
-
-def _interval(bounds: Sequence[float] | None) -> str:
-    if bounds is None:
-        return "–"
-    low, high = bounds
-    return f"{_share(low):.1f}–{_share(high):.1f} %"
-
-
-def _rate(rate: float, bounds: Sequence[float]) -> str:
-    low, high = bounds
-    return f"{_share(rate):.1f} ({_share(low):.1f}–{_share(high):.1f})"
-
-
-def _count(counts: Sequence[int]) -> str:
-    right, total = counts
-    return f"{whole_number(right, 'count', 0, whole_number(total, 'count'))} of {total}"
-
-
-def _number(value: float | None) -> str:
-    return "–" if value is None else f"{value:.2f}" if isinstance(value, float) else str(value)
+    return per_cent(value), per_cent(low), per_cent(high)
 
 
 #: Commands whose results can be shown, with the page's heading.
-EXPERIMENTS: Final[Mapping[str, tuple[str, Callable[[Mapping[str, Any]], _Views]]]] = {
+EXPERIMENTS: Final[Mapping[str, tuple[str, _Plots]]] = {
     "table1": ("Table 1", _table1),
     "figure3": ("Figure 3", _figure3),
     "ablation": ("What each part of the model adds", _ablation),

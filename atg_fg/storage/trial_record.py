@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 from atg_fg.core.records import TrialRecord
-from atg_fg.storage.checked_json import plain_json
+from atg_fg.storage.checked_json import plain_json, without_none
 from atg_fg.storage.memory_json import write_assumptions
 
 #: What the first line of a record says that it is.
@@ -38,7 +38,7 @@ def _step_line(record: TrialRecord, time: int) -> dict[str, Any]:
     step, actions = record.steps[time], record.assumptions.actions
     bound = step.total_variation_bound
     expected = step.expected_entropies
-    return {
+    line = {
         "step": time,
         "observed": step.detection,
         "objects": step.belief.objects,
@@ -47,7 +47,8 @@ def _step_line(record: TrialRecord, time: int) -> dict[str, Any]:
         "log_evidence": step.log_evidence,
         "expected_entropy": None if expected is None else dict(zip(actions, expected.tolist(), strict=True)),
         "action": None if step.action is None else actions[step.action],
-        **({} if step.purpose is None else {"purpose": step.purpose}),
-        **({} if bound is None else {"total_variation_bound": bound}),
+        "purpose": step.purpose,
+        "total_variation_bound": bound,
         "truth": step.truth,
     }
+    return without_none(line, but_for=("expected_entropy", "action"))

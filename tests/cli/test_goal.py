@@ -22,7 +22,7 @@ def test_it_shows_a_table_with_intervals(run):
     status, output, _ = run("goal", *QUICK, "--learning-actions", "0")
     assert status == 0
     assert "goals reached" in output
-    assert "6/6" in output
+    assert "6 of 6" in output
     assert "95% interval" in output
 
 

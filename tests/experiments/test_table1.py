@@ -262,5 +262,5 @@ class TestSettled:
 
     @pytest.mark.parametrize("settled", [0.0, float("nan")])
     def test_an_entropy_that_means_nothing_is_refused(self, settled):
-        with pytest.raises(InvalidInputError, match=f"settled: {settled}; expected"):
+        with pytest.raises(InvalidInputError, match=f": {settled}; expected a finite entropy"):
             TestPlan(settled=settled)

@@ -203,7 +203,7 @@ def test_a_run_has_a_trial_a_station_with_its_goal(goal_run):
 def test_a_result_becomes_tables_and_plots(result, tables, plots):
     report = read_report(RESULTS / f"{result}.json")
     assert (len(report.tables), len(report.plots)) == (tables, plots)
-    assert all(len(row) == len(table.columns) for table in report.tables for row in table.rows)
+    assert all(len(row) == len(table.headings) for table in report.tables for row in table.rows)
     for plot in report.plots:
         for point in (point for series in plot.series for point in series.points if point.low is not None):
             assert 0 <= point.low <= point.y <= point.high <= 100
