@@ -161,7 +161,7 @@ def _engine_row(engine: Mapping[str, Any]) -> tuple[str, str, str, str]:
 def _rescore(document: Mapping[str, Any]) -> list[Table]:
     rows = [
         (
-            "/".join(test["file"].split("/")[-2:]),
+            "\n".join(test["file"].removesuffix(".jsonl.gz").split("/")[-2:]),  # folder and name
             _count(test["identification"]),
             _count(test["recognition"]),
             _rate(test["success"][0] / test["success"][1], test["interval95"]),

@@ -23,7 +23,7 @@ def test_it_shows_a_table_with_intervals(run):
     assert status == 0
     assert "goals reached" in output
     assert "6 of 6" in output
-    assert "95% interval" in output
+    assert "95 % interval" in output
 
 
 def test_runs_go_on_where_they_were_cut_off(run, tmp_path):
