@@ -20,7 +20,15 @@ def whole_number(value: Any, place: str, least: int = 0, most: int | None = None
     return int(value)
 
 
-def number(value: Any, place: str, least: float = -math.inf, most: float = math.inf, slack: float = 0.0) -> float:
+def number(
+    value: Any,
+    place: str,
+    least: float = -math.inf,
+    most: float = math.inf,
+    *,
+    below: float = math.inf,
+    slack: float = 0.0,
+) -> float:
     """Return ``value`` as a float, or raise ``InvalidInputError`` unless it is a finite number in these bounds.
 
     Args:
@@ -28,6 +36,7 @@ def number(value: Any, place: str, least: float = -math.inf, most: float = math.
         place: Named in the error.
         least: Lower bound.
         most: Upper bound.
+        below: Upper bound that is no longer allowed itself.
         slack: How far rounding may have carried it past a bound.
     """
     is_number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
@@ -35,8 +44,9 @@ def number(value: Any, place: str, least: float = -math.inf, most: float = math.
         found = float(value) if is_number else math.nan
     except OverflowError:  # a whole number too large for a float
         found = math.inf
-    if not math.isfinite(found) or not least - slack <= found <= most + slack:
-        bounds = f" from {least:g} to {most:g}" if most < math.inf else f" of at least {least:g}" * (least > -math.inf)
+    if not math.isfinite(found) or not least - slack <= found <= most + slack or found >= below:
+        ends = f"to below {below:g}" if below < math.inf else f"to {most:g}" if most < math.inf else ""
+        bounds = f" from {least:g} {ends}" if ends else f" of at least {least:g}" * (least > -math.inf)
         raise InvalidInputError(f"{place}: {brief(value)}; expected a finite number{bounds}")
     return found
 

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
+from atg_fg.core.checks import number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import LEAST_SHARE
 
@@ -31,23 +31,11 @@ class ModelParameters:
     learn_structure: bool = False
 
     def __post_init__(self) -> None:
-        alpha, delta = self.transition_concentration, self.observation_noise
-        if not _is_finite_number(alpha) or alpha < 0:
-            raise InvalidInputError(f"transition_concentration: {alpha!r}; expected a finite number of at least 0")
-        if not _is_finite_number(delta) or not 0 <= delta < 1:
-            raise InvalidInputError(f"observation_noise: {delta!r}; expected a number from 0 to below 1")
+        number(self.transition_concentration, "transition_concentration", 0.0)
+        number(self.observation_noise, "observation_noise", 0.0, below=1.0)
         for name in ("transition_concentration", "observation_noise"):
             if 0 < getattr(self, name) < LEAST_SHARE:
                 raise InvalidInputError(f"{name}: {getattr(self, name)!r}; expected 0, or at least {LEAST_SHARE}")
         for name in ("learn_in_trial", "learn_structure"):
             if not isinstance(getattr(self, name), bool):
                 raise InvalidInputError(f"{name}: {getattr(self, name)!r}; expected true or false")
-
-
-def _is_finite_number(value: object) -> bool:
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        return False
-    try:
-        return math.isfinite(value)
-    except OverflowError:  # a whole number too large for a float
-        return False

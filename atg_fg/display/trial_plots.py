@@ -9,6 +9,7 @@ import numpy as np
 
 from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.belief import IdentityBelief
+from atg_fg.core.checks import whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.records import TrialRecord
 from atg_fg.display.atg_picture import draw_atg
@@ -162,8 +163,7 @@ def _check_beliefs(beliefs: Sequence[IdentityBelief], names: Sequence[str], top:
             raise InvalidInputError(
                 f"beliefs[{step}]: {len(belief.objects)} objects; expected one for each of {len(names)} names"
             )
-    if isinstance(top, bool) or not isinstance(top, int) or top < 1:
-        raise InvalidInputError(f"top: {top!r}; expected a whole number of at least 1")
+    whole_number(top, "top", least=1)
 
 
 def _check_entropies(

@@ -12,10 +12,9 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
-from atg_fg.core.checks import one_of, whole_number
+from atg_fg.core.checks import number, one_of, whole_number
 from atg_fg.core.log_math import log_of, log_sum_exp
 from atg_fg.core.patterns import FloatArray
-from atg_fg.engines.options import number_between
 from atg_fg.engines.whole_trial import Posterior, WholeTrialInference, joint_of
 from atg_fg.inference.chain import Chain
 from atg_fg.inference.interface import TrialSetup
@@ -67,10 +66,10 @@ class LoopyBeliefPropagation(WholeTrialInference):
         tolerance: float = 1e-10,
     ) -> None:
         super().__init__(setup)
-        self.damping = number_between("damping", damping, 0.0, 1.0)
+        self.damping = number(damping, "damping", 0.0, below=1.0)
         self.schedule = one_of(schedule, "schedule", SCHEDULES)
         self.max_iterations = whole_number(max_iterations, "max_iterations", 1)
-        self.tolerance = number_between("tolerance", tolerance, 0.0, 1.0)
+        self.tolerance = number(tolerance, "tolerance", 0.0, below=1.0)
         self._report = LoopyReport(0, converged=True, largest_change=0.0)
         self._messages: Messages | None = None
 

@@ -16,10 +16,9 @@ from typing import ClassVar, NamedTuple
 import numpy as np
 
 from atg_fg.core.belief import IdentityBelief
-from atg_fg.core.checks import whole_number
+from atg_fg.core.checks import number, whole_number
 from atg_fg.core.log_math import log_sum_exp, x_log_x
 from atg_fg.core.patterns import Evidence, FloatArray
-from atg_fg.engines.options import number_between
 from atg_fg.engines.support import SupportedInference
 from atg_fg.inference.interface import TrialSetup
 
@@ -83,9 +82,9 @@ class MeanField(SupportedInference):
         tolerance: float = 1e-10,
     ) -> None:
         super().__init__(setup)
-        self.floor = number_between("floor", floor, 1e-300, 1e-3)
+        self.floor = number(floor, "floor", 1e-300, below=1e-3)
         self.max_iterations = whole_number(max_iterations, "max_iterations", 1)
-        self.tolerance = number_between("tolerance", tolerance, 0.0, 1.0)
+        self.tolerance = number(tolerance, "tolerance", 0.0, below=1.0)
         self.objects: FloatArray = self.model.prior
         self.aspects: FloatArray = self.model.prior @ self.model.base_row
         self.report: MeanFieldReport | None = None

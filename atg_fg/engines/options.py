@@ -4,9 +4,6 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Iterable
-from typing import Any
-
-import numpy as np
 
 from atg_fg.core.errors import InvalidInputError
 
@@ -24,11 +21,3 @@ def check_known(engine: type, name: str, options: Iterable[str]) -> None:
         if option not in known:
             expected = f"one of: {', '.join(known)}" if known else "none, this engine has no options"
             raise InvalidInputError(f"engine {name!r}: unknown option {option!r}; expected {expected}")
-
-
-def number_between(option: str, value: Any, least: float, below: float) -> float:
-    """Return ``value`` as a float, or raise ``InvalidInputError`` unless ``least`` ≤ value < ``below``."""
-    number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
-    if not number or not least <= float(value) < below:
-        raise InvalidInputError(f"{option}: {value!r}; expected a number from {least} to below {below}")
-    return float(value)

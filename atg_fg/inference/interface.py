@@ -11,6 +11,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 
 from atg_fg.core.belief import SHOWN, BeliefTable, IdentityBelief
+from atg_fg.core.checks import whole_number
 from atg_fg.core.errors import ImpossibleEvidenceError, InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
@@ -111,9 +112,7 @@ class Inference(ABC):
         """
         if self.history.awaits_evidence:
             raise InvalidInputError("trial: an action without an observation before it; expected an observation")
-        whole = isinstance(action, (int, np.integer)) and not isinstance(action, bool)
-        if not whole or not 0 <= action < self.model.n_actions:
-            raise InvalidInputError(f"action: {action!r}; expected 0 to {self.model.n_actions - 1}")
+        whole_number(action, "action", 0, self.model.n_actions - 1)
         self.history.actions.append(int(action))
         try:
             self._act(int(action))

@@ -9,6 +9,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from atg_fg.core.assumptions import Assumptions
+from atg_fg.core.checks import whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import FloatArray
 from atg_fg.inference.interface import Inference
@@ -47,8 +48,7 @@ class BeliefFeatures:
     """
 
     def __init__(self, assumptions: Assumptions, top: int = TOP, *, expected_entropies: bool = True) -> None:
-        if isinstance(top, bool) or not isinstance(top, int) or top < 1:
-            raise InvalidInputError(f"top: {top!r}; expected a whole number of at least 1")
+        whole_number(top, "top", least=1)
         self.assumptions, self.top, self.expected_entropies = assumptions, top, expected_entropies
 
     @property

@@ -102,7 +102,7 @@ def read_step(fields: Mapping[str, Any], place: str, assumptions: Assumptions | 
     return StepSummary(
         observed,
         pattern,
-        number(fields["unseen"], f"{place}: unseen", 0.0, 1.0, _SLACK),
+        number(fields["unseen"], f"{place}: unseen", 0.0, 1.0, slack=_SLACK),
         number(fields["entropy"], f"{place}: entropy", 0.0, slack=_SLACK),
         _truth(fields["truth"], f"{place}: truth"),
         None if action is None else plain_text(action, f"{place}: action"),

@@ -8,7 +8,7 @@ from typing import Any, Final, TypeAlias
 
 import numpy as np
 
-from atg_fg.core.checks import number
+from atg_fg.core.checks import number, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import Pattern, PatternAlphabet
 from atg_fg.worlds.arcube import ACTION_SOURCES, BACK, FACES, FRONT, N_TAGS, ORIENTATIONS, SUCCESSORS, shown_pattern
@@ -45,7 +45,7 @@ def hexagonal_prisms(n_objects: int, seed: int, *, n_symbols: int = 12) -> Objec
 
     A prism stands on an end with a side in front, or lies with an end in front and a side on top: 24 states.
     """
-    _check_count("n_symbols", n_symbols, _N_SIDES + 2)
+    whole_number(n_symbols, "n_symbols", _N_SIDES + 2)
     alphabet = PatternAlphabet(("front", "top"), n_symbols)
     states, mechanism = closed_mechanism((True, 0, 0), (_tip, partial(_roll, 1), partial(_roll, -1)))
 
@@ -87,7 +87,7 @@ def ring_locks(n_objects: int, seed: int, *, n_rings: int = 2, n_symbols: int = 
     """
     if n_rings not in (2, 3):
         raise InvalidInputError(f"n_rings: {n_rings!r}; expected 2 or 3")
-    _check_count("n_symbols", n_symbols, n_rings * _N_RING)
+    whole_number(n_symbols, "n_symbols", n_rings * _N_RING)
     alphabet = PatternAlphabet(("left", "right") if n_rings == 2 else ("left", "middle", "right"), n_symbols)
     start = tuple((ring, 0) for ring in range(n_rings))
     states, mechanism = closed_mechanism(start, (_swap, partial(_turn_ring, 0), partial(_turn_ring, n_rings - 1)))
@@ -120,7 +120,7 @@ def lid_boxes(n_objects: int, seed: int, *, n_symbols: int = 12) -> ObjectFamily
 
     The lid comes off once and for all; then the top shows what is inside. 8 states, four with the lid on.
     """
-    _check_count("n_symbols", n_symbols, _N_WALLS + 2)
+    whole_number(n_symbols, "n_symbols", _N_WALLS + 2)
     alphabet = PatternAlphabet(("front", "right", "top"), n_symbols)
     states, mechanism = closed_mechanism((False, 0), (_open, partial(_turn_box, -1), partial(_turn_box, 1)))
 
@@ -172,7 +172,7 @@ def random_atgs(
     """
     if n_slots not in (1, 2, 3):
         raise InvalidInputError(f"n_slots: {n_slots!r}; expected 1, 2 or 3")
-    _check_count("n_symbols", n_symbols, n_slots)
+    whole_number(n_symbols, "n_symbols", n_slots)
     alphabet = PatternAlphabet(("front", "top", "right")[:n_slots], n_symbols)
     draw = _random_atg(alphabet, n_aspects, n_successors, concentration)
     return ObjectFamily(_CUBE_ACTIONS, alphabet, _different(n_objects, draw, _generator(seed)))
@@ -187,7 +187,7 @@ def half_and_half(n_objects: int, seed: int, *, n_successors: int = 3, concentra
         n_successors: As for ``random_atgs``.
         concentration: As for ``random_atgs``.
     """
-    _check_count("n_objects", n_objects, 2)
+    whole_number(n_objects, "n_objects", 2)
     rng = _generator(seed)
     draw = _random_atg(_CUBE_ALPHABET, len(ORIENTATIONS), n_successors, concentration)
     n_random = n_objects // 2
@@ -205,7 +205,7 @@ def cubes_with_repeated_tags(n_objects: int, seed: int, *, share: float = 1 / 3)
         seed: Of all that is drawn.
         share: Of the objects, the first ones, rounded to a whole number of them.
     """
-    _check_count("n_objects", n_objects, 1)
+    whole_number(n_objects, "n_objects", 1)
     n_repeating = round(probability_option("share", share) * n_objects)
     rng = _generator(seed)
     repeating = _different(n_repeating, partial(_draw_cube, repeating=True), rng)
@@ -223,8 +223,8 @@ def _draw_cube(rng: np.random.Generator, *, repeating: bool = False) -> FiniteOb
 
 def _random_atg(alphabet: PatternAlphabet, n_aspects: int, n_successors: int, concentration: float) -> _Draw:
     """Return what draws a random ATG, once its options are checked."""
-    _check_count("n_aspects", n_aspects, 1, len(alphabet))
-    _check_count("n_successors", n_successors, 1, n_aspects)
+    whole_number(n_aspects, "n_aspects", 1, len(alphabet))
+    whole_number(n_successors, "n_successors", 1, n_aspects)
     # Beyond these bounds the draws are no longer numbers.
     number(concentration, "concentration", least=1e-6, most=1e6)
     shape = (n_aspects, len(_CUBE_ACTIONS))
@@ -244,7 +244,7 @@ def _random_atg(alphabet: PatternAlphabet, n_aspects: int, n_successors: int, co
 
 def _different(n: int, draw: _Draw, rng: np.random.Generator) -> tuple[FiniteObject, ...]:
     """Draw ``n`` objects, no two of which look the same however they are acted on."""
-    _check_count("n_objects", n, 0)
+    whole_number(n, "n_objects", 0)
     objects: dict[Any, FiniteObject] = {}
     in_vain = 0
     while len(objects) < n:
@@ -259,16 +259,8 @@ def _different(n: int, draw: _Draw, rng: np.random.Generator) -> tuple[FiniteObj
 
 
 def _generator(seed: int) -> np.random.Generator:
-    _check_count("objects_seed", seed, 0)
+    whole_number(seed, "objects_seed", 0)
     return np.random.default_rng(seed)
-
-
-def _check_count(name: str, value: int, least: int, most: int | None = None) -> None:
-    """Refuse what is no whole number from ``least`` to ``most``."""
-    is_whole = isinstance(value, (int, np.integer)) and not isinstance(value, bool)
-    if not is_whole or value < least or (most is not None and value > most):
-        expected = f"of at least {least}" if most is None else f"from {least} to {most}"
-        raise InvalidInputError(f"{name}: {value!r}; expected a whole number {expected}")
 
 
 #: Families by the name of their world.
