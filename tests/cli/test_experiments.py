@@ -100,7 +100,7 @@ def test_other_numbers_of_actions_are_refused(text):
     ("arguments", "message"),
     [
         (["--engine", "magic"], "engine: unknown name 'magic'; expected one of: bayes-filter, enumeration, gibbs,"),
-        (["--world", "magic"], "world: unknown name 'magic'; expected one of: half-and-half, ideal, lid-box"),
+        (["--world", "magic"], "world: unknown name 'magic'; expected one of: detector, half-and-half, ideal, lid-box"),
         (["--world", "nowhere:some/World-v0"], "world 'nowhere:some/World-v0': cannot be made"),
         (["--preset", "magic"], "preset: unknown name 'magic'; expected one of: default, learned, paper"),
         (["--policy", "magic"], "policy: unknown name 'magic'; expected one of: entropy, explore, lookahead-2"),
