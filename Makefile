@@ -9,7 +9,7 @@ PEERS := .venv-peers
 PEERS_READY := $(PEERS)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help setup peers demo test test-all test-peers torture package lint format notebooks docs bench results results-engines results-robot results-goal \
+.PHONY: help setup peers demo test test-all test-peers torture package lint format notebooks docs bench results results-engines results-robot results-goal results-evidence \
 	results-structure example-memory tour clean
 
 help:  ## Say what there is to make
@@ -169,6 +169,20 @@ results-structure: $(READY)  ## Run the experiments on learned structure (about 
 	$(BIN)/atg-fg rescore results/robonaut/*/test-0000.jsonl.gz --preset learned --json results/rescore_learned.json
 	$(BIN)/atg-fg ablation --variants "paper;default;learned" --tests 10 --log results/ablation.jsonl \
 		--json results/ablation.json --plot docs/images/ablation.png
+
+# Evidence that errs: each world of the table in docs/experiments.md.
+DETECTOR := table1 --preset learned --world detector --objects 8 --trials 48 --actions 8 --tests 20
+NOISY := table1 --preset learned --tests 10
+results-evidence: $(READY)  ## Run the experiments on evidence that errs (about an hour on 2 cores)
+	mkdir -p results/evidence
+	for noise in 0,0 0.05,0.05 0.2,0.1; do for confidences in false true; do for own in false true; do \
+		$(BIN)/atg-fg $(DETECTOR) --wrong $${noise%,*} --missing $${noise#*,} --world-option confidences=$$confidences \
+			--world-option own_dynamics=$$own --json results/evidence/detector_$${noise}_$${confidences}_$$own.json || exit; \
+	done; done; done
+	$(BIN)/atg-fg $(NOISY) --wrong 0.1 --missing 0.1 --json results/evidence/cubes_10_10.json
+	$(BIN)/atg-fg $(NOISY) --wrong 0.2 --missing 0.2 --json results/evidence/cubes_20_20.json
+	$(BIN)/atg-fg $(NOISY) --slip 0.05 --wrong 0.01 --json results/evidence/cubes_slip.json
+	$(BIN)/atg-fg $(NOISY) --slip 0.05 --wrong 0.1 --missing 0.1 --json results/evidence/cubes_slip_10_10.json
 
 # The memory that `atg-fg memory example` writes: 30 trials, one after the other, of the 100 cubes of seed 0.
 EXAMPLE := out/example.json

@@ -173,6 +173,10 @@ def _table1(title: str, results: Iterable[TestResult], summary: dict[str, Any], 
     for ending in ("lost", "undecided"):
         if summary[ending]:
             table.add_row(f"{ending} trials", str(summary[ending]))
+    if "mended" in summary:
+        mended = summary["mended"]
+        share = f"{mended['right']}/{mended['trials']} ({100 * mended['right'] / mended['trials']:.1f}%)"
+        table.add_row("right after mending", "", "", share)
     if "merges" in summary:
         table.add_row("merged ATGs", str(summary["merges"]), f"{summary['false_merges']} falsely")
     if beside_paper:

@@ -163,6 +163,7 @@ def summarise(results: Iterable[TestResult]) -> dict[str, Any]:
                 "lost": test.lost,
                 "undecided": test.undecided,
                 **_merges_of([test]),
+                **({} if test.mended is None else {"mended": list(test.mended)}),
             }
             for test in tests
         ],
@@ -172,6 +173,7 @@ def summarise(results: Iterable[TestResult]) -> dict[str, Any]:
         "lost": sum(test.lost for test in tests),
         "undecided": sum(test.undecided for test in tests),
         **_merges_of(tests),
+        **_mended(tests),
     }
 
 
@@ -180,6 +182,15 @@ def actions_a_trial(results: Iterable[TestResult]) -> dict[str, Any]:
     numbers = [number for test in results for number in test.actions]
     interval = mean_interval(numbers)
     return {"mean": mean(numbers), "interval95": None if interval is None else list(interval)}
+
+
+def _mended(tests: Sequence[TestResult]) -> dict[str, Any]:
+    """Return how many trials are with the ATG of their object at the end, in tests that mended any."""
+    counts = [test.mended for test in tests if test.mended is not None]
+    if not counts:
+        return {}
+    right, total = (sum(each) for each in zip(*counts, strict=True))
+    return {"mended": {"right": right, "trials": total, "interval95": list(wilson_interval(right, total))}}
 
 
 def _merges_of(tests: Sequence[TestResult]) -> dict[str, int]:
