@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import ctypes
 import importlib.util
 import os
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from atg_fg.core.errors import MissingDependencyError
 
@@ -29,11 +32,24 @@ def import_quietly(module: str) -> None:
     if module in sys.modules:
         return
     sys.stderr.flush()
-    standard_error, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(nowhere, 2)
+    with silenced(2):
         importlib.import_module(module)
+
+
+@contextmanager
+def silenced(stream: int) -> Iterator[None]:
+    """Drop what C code prints on standard output (1) or standard error (2) meanwhile.
+
+    PyBullet tells on standard output what it thinks of a robot, where a command's JSON goes.
+    """
+    flush = ctypes.CDLL(None).fflush if os.name == "posix" else lambda _: None
+    flush(None)
+    kept, nowhere = os.dup(stream), os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nowhere, stream)
+        yield
     finally:
-        os.dup2(standard_error, 2)
-        os.close(standard_error)
+        flush(None)
+        os.dup2(kept, stream)
+        os.close(kept)
         os.close(nowhere)

@@ -115,7 +115,10 @@ Condition = Annotated[
 ]
 Urdf = Annotated[
     Path | None,
-    typer.Option(help="Your own description of the robot, such as NASA's (world robonaut).", rich_help_panel=WORLD),
+    typer.Option(
+        help="Your own robot, URDF as NASA's or a mapping, TOML (world robonaut).",
+        rich_help_panel=WORLD,
+    ),
 ]
 
 

@@ -15,6 +15,7 @@ from sim.bodies.cube import CUBE_CENTRE
 from sim.bodies.prepared_robot import PreparedRobot, shell
 from sim.bodies.rail import Rail, on_rail
 from sim.bodies.robot_model import BASE
+from sim.simulator import silenced
 
 #: Links no more joints apart than this cannot hit each other; their shapes overlap at the joint.
 _NEIGHBOURS: Final = 3
@@ -66,6 +67,9 @@ class RobotBody:
             self.body, self.arm_joints, pybullet.VELOCITY_CONTROL, forces=free, physicsClientId=client
         )
         self.reset(robot.home)
+        with silenced(1):
+            # PyBullet builds what it needs for inverse dynamics, and tells of axes that rounding left no unit vectors.
+            self.gravity_torques(robot.home)
 
     def reset(self, angles: FloatArray) -> None:
         """Put the arms at rest at joint angles of shape [2, 7] (rad); not for use while a trial goes on."""
@@ -147,7 +151,8 @@ class RobotBody:
             path.write_text(urdf)
             for name, content in self.model.meshes.items():
                 (path.parent / name).write_text(content)
-            return int(pybullet.loadURDF(str(path), useFixedBase=True, flags=flags, physicsClientId=self.client))
+            with silenced(1):
+                return int(pybullet.loadURDF(str(path), useFixedBase=True, flags=flags, physicsClientId=self.client))
 
     def _ancestors(self, link: int) -> list[int]:
         """Return a link and all that it hangs on, up to the base."""

@@ -2,16 +2,27 @@
 
 from __future__ import annotations
 
+import sysconfig
+import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Final
+from pathlib import Path
+from typing import Any, Final, cast
 
 import numpy as np
 
+from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import FloatArray
-from sim.bodies.robonaut_joints import ARM_AXIS, NECK, SIDES, WAIST, arm, arm_joint_names, mirrored
+from sim.bodies.robonaut_joints import ARM_AXIS, N_ARM_JOINTS, NECK, SIDES, WAIST, arm, arm_joint_names, mirrored
 from sim.bodies.robonaut_shapes import EYE
 
+_MOST_BYTES: Final = 100_000
+_INSTALLED: Final = "site-packages:"
+_HAND_KEYS: Final = {"joints", "hand", "forward", "palm"}
+_KEYS: Final = {
+    *("urdf", "name", "waist", "held", "shoulders", "eye", "velocity", "effort", "rotor_inertia"),
+    *SIDES,
+}
 #: Where the middle between the shoulders stands in the robot's frame if nothing is said, m: Robonaut's.
 SHOULDERS: Final = np.array([-0.0255, 0.0, 0.5443])
 #: Leant back, looking down at the table, rad; NASA's as far back as it goes, to see past its chin.
@@ -68,6 +79,102 @@ class RobotMapping:
     def named(self) -> tuple[str, ...]:
         """Names of the joints that must be there."""
         return self.moved if self.waist is None else (self.waist, *self.moved)
+
+
+def read_mapping(path: Path) -> tuple[Path, RobotMapping]:
+    """Read a mapping from a TOML file; return the path of the description that it names, and the mapping.
+
+    The description is looked for beside the file, or, after ``site-packages:``, among the installed Python packages.
+
+    Raises:
+        InvalidInputError: The file cannot be read, or is no mapping.
+    """
+    try:
+        if not path.is_file() or path.stat().st_size > _MOST_BYTES:
+            raise OSError("not a plain file" if path.exists() else "no such file")
+        told = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InvalidInputError(f"{path}: cannot be read as a mapping: {error}; expected TOML") from error
+    try:
+        return _description_named(_text(told, "urdf"), path), _mapping(told)
+    except ValueError as error:
+        raise InvalidInputError(f"{path}: {error}; expected a mapping as in docs/simulation.md") from error
+
+
+def _description_named(name: str, mapping: Path) -> Path:
+    installed = name.removeprefix(_INSTALLED)
+    return mapping.parent / name if installed == name else Path(sysconfig.get_paths()["purelib"]) / installed
+
+
+def _mapping(told: dict[str, Any]) -> RobotMapping:
+    """Return what a mapping file tells, or raise ``ValueError``."""
+    unknown = told.keys() - _KEYS
+    if unknown:
+        raise ValueError(f"{min(unknown)}: not one of {', '.join(sorted(_KEYS))}")
+    sides = [told.get(side) for side in SIDES]
+    for side, hand in zip(SIDES, sides, strict=True):
+        if not isinstance(hand, dict) or hand.keys() != _HAND_KEYS:
+            raise ValueError(f"[{side}]: {hand!r} has not exactly {', '.join(sorted(_HAND_KEYS))}")
+    left, right = cast(list[dict[str, Any]], sides)
+    arms = tuple(_joints(hand, side) for side, hand in zip(SIDES, (left, right), strict=True))
+    vectors = {key: np.array([_unit(left, key), _unit(right, key)]) for key in ("forward", "palm")}
+    return RobotMapping(
+        arms=(arms[0], arms[1]),
+        **vectors,
+        name=_text(told, "name"),
+        hands=(_text(left, "hand"), _text(right, "hand")),
+        waist=_text(told, "waist") if "waist" in told else None,
+        held=_positions(told.get("held", {})),
+        **{key: _numbers(told, key, 3) for key in ("shoulders", "eye") if key in told},
+        **{key: _positive(told, key) for key in ("velocity", "effort", "rotor_inertia") if key in told},
+    )
+
+
+def _joints(hand: dict[str, Any], side: str) -> tuple[str, ...]:
+    names = hand["joints"]
+    whole = isinstance(names, list) and all(isinstance(name, str) for name in names)
+    if not whole or len(names) != N_ARM_JOINTS or len(set(names)) < len(names):
+        raise ValueError(f"[{side}] joints: {names!r} is not a list of {N_ARM_JOINTS} names")
+    return tuple(names)
+
+
+def _positions(held: Any) -> dict[str, float]:
+    if not isinstance(held, dict) or not all(_is_number(value) for value in held.values()):
+        raise ValueError(f"held: {held!r} is not a table of joints and angles")
+    return {name: float(value) for name, value in held.items()}
+
+
+def _text(told: dict[str, Any], key: str) -> str:
+    value = told.get(key)
+    if not isinstance(value, str) or not value:
+        raise ValueError(f"{key}: {value!r} is not a name")
+    return value
+
+
+def _numbers(told: dict[str, Any], key: str, number: int) -> FloatArray:
+    values = told[key]
+    if not isinstance(values, list) or len(values) != number or not all(_is_number(value) for value in values):
+        raise ValueError(f"{key}: {values!r} is not a list of {number} finite numbers")
+    return np.array(values, dtype=np.float64)
+
+
+def _positive(told: dict[str, Any], key: str) -> FloatArray:
+    values = _numbers(told, key, N_ARM_JOINTS)
+    if not (values > 0).all():
+        raise ValueError(f"{key}: {told[key]!r} are not all above 0")
+    return values
+
+
+def _unit(told: dict[str, Any], key: str) -> FloatArray:
+    vector = _numbers(told, key, 3)
+    length = float(np.linalg.norm(vector))
+    if not length > 0:
+        raise ValueError(f"{key}: {told[key]!r} has no direction")
+    return vector / length
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < np.inf
 
 
 def nasa_mapping() -> RobotMapping:

@@ -24,7 +24,7 @@ from atg_fg.core.errors import InvalidInputError
 from sim.bodies.contact_pads import contact_pad
 from sim.bodies.prepared_robot import PreparedRobot, assembled, kinematics_of
 from sim.bodies.robot import RobotBody
-from sim.bodies.robot_mapping import nasa_mapping
+from sim.bodies.robot_mapping import nasa_mapping, read_mapping
 from sim.bodies.robot_model import RobotModel, fitted
 from sim.bodies.tables import table_top
 from sim.bodies.urdf_reader import read_urdf
@@ -65,8 +65,9 @@ def _prepared(urdf: Path, _stamp: int) -> PreparedRobot:
     return assembled(model, kinematics, home, tucked, pairs)
 
 
-def _model(urdf: Path) -> RobotModel:
-    return fitted(read_urdf(urdf), nasa_mapping())
+def _model(path: Path) -> RobotModel:
+    urdf, mapping = read_mapping(path) if path.suffix == ".toml" else (path, nasa_mapping())
+    return fitted(read_urdf(urdf), mapping)
 
 
 def _run_examination(urdf: Path, found: Path) -> None:

@@ -134,6 +134,10 @@ def with_fists_of_boxes(tree):
     return tree
 
 
+def origin(rpy):
+    return ElementTree.Element("origin", rpy=text(rpy))
+
+
 def like_nasas():
     """The shell with all in which NASA's own files differ from it."""
     turned = [f"r2/right_arm/{name}" for name in ("joint0", "joint2", "joint4", "wrist/yaw")]
