@@ -19,9 +19,20 @@ setup: $(READY)  ## Install into .venv what users and developers need
 
 $(VENV)/.ready-demo: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
-	$(BIN)/python -m pip install --quiet --editable '.[sim,viz]'
+	$(BIN)/python -c "$$needs_of_demo" > $(VENV)/demo.txt
+	$(BIN)/python -m pip install --quiet --no-deps --editable .
+	$(BIN)/python -m pip install --quiet --requirement $(VENV)/demo.txt
 	$(without_samples)
 	touch $@
+
+# All but Numba, which is 200 MB, and samples nothing here.
+define needs_of_demo
+import tomllib
+project = tomllib.load(open('pyproject.toml', 'rb'))['project']
+extras = project['optional-dependencies']
+print(*(each for each in project['dependencies'] + extras['sim'] + extras['viz'] if 'numba' not in each), sep=chr(10))
+endef
+export needs_of_demo
 
 # The sample models in PyBullet's wheel are 140 MB, and nothing here uses them.
 without_samples = rm -rf $(VENV)/lib/python3*/site-packages/pybullet_data
@@ -30,7 +41,7 @@ without_samples = rm -rf $(VENV)/lib/python3*/site-packages/pybullet_data
 $(READY): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1'
-	$(BIN)/python -m pip install --quiet --editable '.[learning,sim,vision,viz,print,report,viewer,notebooks]' \
+	$(BIN)/python -m pip install --quiet --editable '.[sim,vision,viz,print,report,viewer,notebooks]' \
 		--group test --group dev --group docs
 	$(without_samples)
 	touch $@

@@ -6,7 +6,7 @@ import threading
 import time
 from pathlib import Path
 
-from atg_fg.experiments.executors.base import step_done
+from atg_fg.experiments.executors.steps import step_done
 
 
 def square(number):

@@ -17,7 +17,8 @@ from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.records import TrialRecord, TrialSummary
 from atg_fg.engines import begin_trial, check_engine
-from atg_fg.experiments.executors.base import is_cluster, run_pieces, step_done
+from atg_fg.experiments.executors.base import is_cluster, run_pieces
+from atg_fg.experiments.executors.steps import step_done
 from atg_fg.experiments.plans import unusual
 from atg_fg.experiments.scores import Score, TestResult
 from atg_fg.experiments.trial import learn_from, run_trial

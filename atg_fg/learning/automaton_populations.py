@@ -11,9 +11,9 @@ import numpy as np
 from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.learning import gibbs_kernels, kernels
 from atg_fg.learning.chain import Chain, Structure, Task
-from atg_fg.learning.evidence_learner import SavedChain
 from atg_fg.learning.populations import HOPELESS, Conclusion, Population, is_milestone, votes_by_name
 from atg_fg.learning.raw_trials import Recording
+from atg_fg.learning.saved_chain import SavedChain
 
 #: Chains of automata, their sweeps a trial, and how much their scores are tempered: these are means over few sweeps.
 N_AUTOMATA: Final = 6

@@ -11,10 +11,10 @@ from atg_fg.core.log_math import log_sum_exp
 from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.learning import gibbs_kernels, kernels, slip_kernels
 from atg_fg.learning.detector_noise import DetectorNoise
-from atg_fg.learning.evidence_learner import SavedChain
 from atg_fg.learning.kernels import Clusters, TrialArrays
 from atg_fg.learning.number_of_objects import log_new_weights, log_partition
 from atg_fg.learning.raw_trials import Recording
+from atg_fg.learning.saved_chain import SavedChain
 from atg_fg.learning.shared_structure import SharedStructure
 
 #: Beta prior of a slip.

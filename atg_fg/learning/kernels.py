@@ -20,9 +20,7 @@ from atg_fg.core.patterns import FloatArray, IntArray
 try:
     import numba
 except ImportError as error:
-    raise MissingDependencyError(
-        'learning: Numba is not installed; expected it from: pip install "atg-fg[learning]"'
-    ) from error
+    raise MissingDependencyError("learning: Numba is not installed; expected it from: pip install numba") from error
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 

@@ -17,9 +17,9 @@ from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.learning import kernels
 from atg_fg.learning.chain import Chain, Structure, Task
 from atg_fg.learning.detector_noise import DetectorNoise
-from atg_fg.learning.evidence_learner import SavedChain
 from atg_fg.learning.raw_trials import Recording
 from atg_fg.learning.register_search import search_registers
+from atg_fg.learning.saved_chain import SavedChain
 from atg_fg.learning.shared_structure import SharedStructure
 
 #: A chain this many nats behind the best is given up.

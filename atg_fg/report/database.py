@@ -20,7 +20,8 @@ from atg_fg.storage.database.memory_reading import database_holds_memory
 from atg_fg.storage.database.trial_log import TEST_KIND, read_stored_experiments, read_stored_trials
 from atg_fg.storage.memory_files import load_memory
 from atg_fg.storage.presets import PRESETS
-from atg_fg.storage.recorded_test import read_header, stored_test
+from atg_fg.storage.recorded_header import read_header
+from atg_fg.storage.recorded_test import stored_test
 from atg_fg.worlds.registry import WORLDS
 
 _NOTE: Final = (

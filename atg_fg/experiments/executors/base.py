@@ -11,6 +11,7 @@ from typing import Any, Final, Protocol, TypeVar
 from urllib.parse import urlsplit
 
 from atg_fg.core.errors import InvalidInputError, WorkerLostError
+from atg_fg.experiments.executors.steps import piece_here, tell_steps_to
 
 Piece = TypeVar("Piece")
 
@@ -24,10 +25,6 @@ EXECUTORS: Final = "process, thread or dask://host:port"
 
 #: How often it is asked, while pieces run, how many steps they have done.
 _SECONDS: Final = 0.2
-
-
-#: What the piece that runs in this thread has to tell, and to obey.
-_here = threading.local()
 
 
 class Workers(Protocol):
@@ -164,26 +161,6 @@ def check_executor(executor: str, name: str = "executor") -> None:
         raise InvalidInputError(f"{name}: {executor!r}; expected {EXECUTORS}")
 
 
-def step_done() -> None:
-    """Tell that a piece has done a step of its work, such as a trial; long pieces call this after each.
-
-    Raises:
-        SystemExit: Nobody waits for the piece any more. A process is ended from outside, but a thread has to leave by
-            itself.
-    """
-    stop: threading.Event | None = getattr(_here, "stop", None)
-    if stop is not None and stop.is_set():
-        raise SystemExit
-    tell: Callable[[], None] | None = getattr(_here, "tell", None)
-    if tell is not None:
-        tell()
-
-
-def tell_steps_to(tell: Callable[[], None] | None) -> None:
-    """Let ``step_done`` call a function wherever it is called in this thread."""
-    _here.tell = tell
-
-
 def _open(executor: str, jobs: int) -> Workers:
     if executor == "thread":
         return _Threads(jobs)
@@ -208,7 +185,7 @@ class _Threads:
         self._pool = ThreadPoolExecutor(slots, initializer=self._begin_thread)
 
     def _begin_thread(self) -> None:
-        _here.stop = self._stop
+        piece_here.stop = self._stop
         tell_steps_to(lambda: self._steps.append(None))
 
     def submit(self, function: Callable[[Any], Any], piece: Any) -> Future[Any]:

@@ -15,7 +15,7 @@ from multiprocessing.context import SpawnContext, SpawnProcess
 from typing import Any, Final
 
 from atg_fg.core.errors import WorkerLostError
-from atg_fg.experiments.executors.base import tell_steps_to
+from atg_fg.experiments.executors.steps import tell_steps_to
 
 #: What libraries of linear algebra read when they are loaded. There is a process for each processor already, so threads
 #: of theirs would only take turns; and a sum must not depend on how many there are.

@@ -14,7 +14,7 @@ from atg_fg.storage.database.connection import open_to_read, translated
 from atg_fg.storage.database.memory_reading import holds_memory, read_memory_rows
 from atg_fg.storage.database.trial_log import TEST_KIND
 from atg_fg.storage.database.trial_rows import experiments_or_faults, trials_or_faults
-from atg_fg.storage.recorded_test import read_header
+from atg_fg.storage.recorded_header import read_header
 
 #: Faults of one kind after which no more are looked for.
 MAX_FAULTS = 20

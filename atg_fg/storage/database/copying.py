@@ -14,7 +14,7 @@ from atg_fg.core.version import __version__
 from atg_fg.storage.database import trial_rows
 from atg_fg.storage.database.checking import assumptions_of_tests
 from atg_fg.storage.database.trial_log import TEST_KIND, read_stored_experiments, read_stored_trials
-from atg_fg.storage.recorded_test import read_header
+from atg_fg.storage.recorded_header import read_header
 from atg_fg.storage.trial_log import from_line, read_log, to_line
 
 
