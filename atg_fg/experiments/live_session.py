@@ -9,7 +9,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from atg_fg.core.errors import ImpossibleEvidenceError, InvalidInputError
+from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.records import TrialRecord, TrialStep
@@ -187,14 +187,7 @@ class LiveSession:
         else:
             return  # it stands as it stood
         evidence = self._detector.evidence(self.memory.assumptions.alphabet, rest.slots)
-        slots = (rest.slots[name] for name in self.memory.assumptions.alphabet.slots)
-        detection = tuple(None if tag is None else tag.symbol for tag in slots)
-        try:
-            yield Looked(turn or (), self._trial.look(evidence, detection))
-        except ImpossibleEvidenceError as error:
-            yield Noted(f"{error}: the trial ends here")
-            self._trial = None
-            self._watcher.forget_cube()
+        yield Looked(turn or (), self._trial.look(evidence))
 
     def _note_oddities(self, tags: Sequence[DetectedTag]) -> Iterator[Noted]:
         """Say once what no cube of these tags can show."""

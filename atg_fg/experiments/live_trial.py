@@ -44,12 +44,11 @@ class LiveTrial:
         self._policy, self._rng, self._teaching = policy, rng, teaching
         self.record = TrialRecord(memory.names, memory.assumptions)
 
-    def look(self, evidence: Evidence, detection: Detection) -> TrialStep:
+    def look(self, evidence: Evidence) -> TrialStep:
         """Take in a look and return the step, with the action that is proposed next; ``None`` if no more is needed.
 
         Args:
-            evidence: What the look says about the pattern shown.
-            detection: The symbol seen in each slot, ``None`` where nothing was.
+            evidence: What the look says about the pattern shown; its detection goes into the record.
 
         Raises:
             InvalidInputError: It is an action's turn.
@@ -63,11 +62,11 @@ class LiveTrial:
             choice = Choice(choice.action, choice.expected_entropies, "learn")
         bound = None if inference.exact else inference.total_variation_bound
         step = TrialStep(
-            detection,
+            evidence.detection or self._unseen,
             evidence.pattern,
             inference.identity(),
             inference.log_evidence,
-            {},
+            {"confidences": list(evidence.confidences)} if any(evidence.confidences) else {},
             choice.expected_entropies,
             choice.action,
             choice.purpose,
@@ -87,7 +86,7 @@ class LiveTrial:
         nothing = Evidence.of_detection(self.record.assumptions.alphabet, self._unseen)
         for number, action in enumerate(actions):
             if number:
-                self.look(nothing, self._unseen)
+                self.look(nothing)
             self._inference.act(action)
             self.record.steps[-1] = replace(self.record.steps[-1], action=action)
 

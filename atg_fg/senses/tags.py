@@ -365,16 +365,16 @@ class TagDetector:
         if len(set(ids)) != len(ids):
             raise InvalidInputError(f"tags: {', '.join(map(str, ids))} in view at once; expected no id twice")
         likelihood = np.ones(len(alphabet))
+        detection: list[int | None] = [None] * len(seen)
+        certainties: list[float | None] = [None] * len(seen)
         for slot, tag in enumerate(seen):
             if tag is not None:
                 likelihood *= self.likelihood(tag, alphabet.n_symbols)[alphabet.symbols[:, slot]]
-        complete = all(tag is not None and self.certainty(tag, alphabet.n_symbols) >= CERTAIN for tag in seen)
-        pattern = (
-            alphabet.index([tag.symbol for tag in seen if tag is not None and tag.symbol is not None])
-            if complete
-            else None
-        )
-        return Evidence(likelihood, pattern)
+                detection[slot] = tag.symbol
+                certainties[slot] = None if tag.symbol is None else self.certainty(tag, alphabet.n_symbols)
+        certain = all(certainty is not None and certainty >= CERTAIN for certainty in certainties)
+        pattern = alphabet.index([symbol for symbol in detection if symbol is not None]) if certain else None
+        return Evidence(likelihood, pattern, tuple(detection), tuple(certainties))
 
 
 def tag_facing(tags: Sequence[DetectedTag], direction: FloatArray) -> DetectedTag | None:

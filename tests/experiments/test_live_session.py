@@ -39,6 +39,7 @@ def test_frames_become_looks_and_an_empty_table_ends_the_trial():
     assert [event.turn for event in events[:2]] == [(), ("left",)]
     assert events[1].step.detection == (2, 4)
     assert events[1].step.pattern == session.memory.assumptions.alphabet.index((2, 4))
+    assert min(events[1].step.confidences) > 0.99
     assert events[2].learned == "object-000"
     assert session.trial is None
 

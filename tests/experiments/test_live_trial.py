@@ -30,7 +30,7 @@ def live(memory, settled=None, teaching=None, engine="bayes-filter"):
 
 
 def look(trial, detection):
-    return trial.look(Evidence.of_detection(ALPHABET, detection), detection)
+    return trial.look(Evidence.of_detection(ALPHABET, detection))
 
 
 @pytest.mark.parametrize("engine", ["bayes-filter", "enumeration"])

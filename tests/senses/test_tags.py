@@ -174,6 +174,8 @@ def test_the_worse_the_corners_the_less_sure(detector):
 def test_evidence_of_two_slots_is_the_product_and_knows_its_pattern(detector):
     evidence = detector.evidence(ALPHABET, {"front": read(cells(2), 2), "top": read(cells(5), 5)})
     assert evidence.pattern == ALPHABET.index((2, 5))
+    assert evidence.detection == (2, 5)
+    assert evidence.confidences == pytest.approx((1 - FALSE_ALARM * 5 / 6,) * 2)
     sure, other = 1 - FALSE_ALARM * 5 / 6, FALSE_ALARM / 6
     assert evidence.likelihood[ALPHABET.index((2, 5))] == pytest.approx(sure**2)
     assert evidence.likelihood[ALPHABET.index((2, 4))] == pytest.approx(sure * other)
