@@ -70,8 +70,9 @@ test-peers: $(PEERS_READY)  ## Run the tests beside other libraries (JAX, pgmpy,
 	$(PEERS)/bin/python -m pytest -m peers tests/benchmarks/test_peers.py tests/experiments/test_recognition_agent.py \
 		tests/test_guides.py
 
-torture: $(READY)  ## Kill writers, fill disks, damage files, and look at what is left (some ten minutes on 2 cores)
-	$(BIN)/python -m tests.torture --kills 1000 --files 20000
+torture: $(READY)  ## Kill writers, cut the power, fill disks, damage files, fuzz readers (some two hours on 2 cores)
+	$(BIN)/python -m pip install --quiet --group torture
+	$(BIN)/python -m tests.torture --kills 1000 --files 50000 --fuzz 3600
 
 package: $(READY)  ## Build the wheel and the sdist in dist, and try the wheel in an empty environment outside the tree
 	rm -rf dist

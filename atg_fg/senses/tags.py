@@ -14,6 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from atg_fg.core.checks import brief
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.patterns import Evidence, FloatArray, PatternAlphabet
 from atg_fg.senses.opencv import cv2
@@ -150,8 +151,8 @@ def checked_distortion(coefficients: ArrayLike, place: str = "distortion") -> Fl
 def _numbers(values: ArrayLike, place: str, expected: str) -> FloatArray:
     try:
         made = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError) as error:
-        raise InvalidInputError(f"{place}: {values!r}; expected {expected}") from error
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InvalidInputError(f"{place}: {brief(values)}; expected {expected}") from error
     if not np.isfinite(made).all():
         raise InvalidInputError(f"{place}: {made.tolist()}; expected finite numbers")
     return made

@@ -9,7 +9,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from atg_fg.core.checks import plain_text, whole_number
+from atg_fg.core.checks import number, plain_text, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.senses.camera_calibration import Calibration
 from atg_fg.senses.tags import Tags, check_ids, dictionary_name
@@ -82,9 +82,9 @@ class CubeTags:
         check_ids(self.dictionary, self.ids)
         if len(self.ids) < 2:
             raise InvalidInputError(f"tag ids: {list(self.ids)}; expected at least two, for front and top")
-        for number, faces in enumerate(self.cubes):
+        for index, faces in enumerate(self.cubes):
             if len(faces) != 6 or not set(faces) <= set(self.ids) or len(set(faces)) != 6:
-                raise InvalidInputError(f"cubes[{number}]: {list(faces)}; expected six different ids of these tags")
+                raise InvalidInputError(f"cubes[{index}]: {list(faces)}; expected six different ids of these tags")
 
     def seen_by(self, calibration: Calibration) -> Tags:
         """Return what a detector is to look for through a camera."""
@@ -122,14 +122,12 @@ def read_tags(path: Path | str) -> CubeTags:
     document = parse_json(read_text_file(path), place)
     read_object(document, place, ("format", "version", "dictionary", "size_metres", "ids"), ("cubes",))
     check_format(document, TAGS_FORMAT, place)
-    size = document["size_metres"]
-    if isinstance(size, bool) or not isinstance(size, (int, float)):
-        raise InvalidInputError(f"{place}: size_metres: {size!r}; expected metres above 0")
+    size = number(document["size_metres"], f"{place}: size_metres", least=0.0)
     ids = _ids(document["ids"], f"{place}: ids")
     cubes = read_list(document.get("cubes", []), f"{place}: cubes")
-    faces = tuple(_ids(each, f"{place}: cubes[{number}]") for number, each in enumerate(cubes))
+    faces = tuple(_ids(each, f"{place}: cubes[{index}]") for index, each in enumerate(cubes))
     with placed(place):
-        return CubeTags(plain_text(document["dictionary"], "dictionary"), float(size), ids, faces)
+        return CubeTags(plain_text(document["dictionary"], "dictionary"), size, ids, faces)
 
 
 def _ids(value: Any, place: str) -> tuple[int, ...]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import json
+import tokenize
 import zipfile
 import zlib
 from pathlib import Path
@@ -34,6 +35,8 @@ _UNSOUND: Final = (
     MemoryError,
     OverflowError,
     SyntaxError,
+    RecursionError,
+    tokenize.TokenError,
     TypeError,
     NotImplementedError,
     zipfile.BadZipFile,

@@ -30,6 +30,10 @@ _PART: Final = 2**20
 _FED: Final = 2**16
 
 
+#: Zeros at the end by which it is told that a member was not written: no sound one ends with as many.
+_UNWRITTEN: Final = 9
+
+
 def byte_limit(usual: int) -> int:
     """Return the limit that the environment variable gives, or else the usual one.
 
@@ -60,6 +64,8 @@ def unpacked_limit(packed: int) -> int:
 def gzip_members(content: bytes, path: Path | str) -> Iterator[tuple[bytes, int]]:
     """Yield what each whole gzip member unfolds to, and where it ends; half a member at the end is left out.
 
+    So is what a power cut can leave of the last one on some file systems: zeros in place of all, or of the rest, of it.
+
     Args:
         content: Of the file.
         path: For error messages.
@@ -71,11 +77,16 @@ def gzip_members(content: bytes, path: Path | str) -> Iterator[tuple[bytes, int]
     limit = left = unpacked_limit(len(content))
     data, at = memoryview(content), 0
     while at < len(data):
-        member, parts, asked = zlib.decompressobj(_GZIP), [b""], 0
+        member, parts, asked, start = zlib.decompressobj(_GZIP), [b""], 0, at
         # Once all is taken in there may still be something to come out.
         while not member.eof and (at < len(data) or len(parts[-1]) == asked > 0):
             fed, asked = data[at : at + _FED], min(_PART, left + 1)
-            parts.append(member.decompress(fed, asked))
+            try:
+                parts.append(member.decompress(fed, asked))
+            except zlib.error:
+                if not any(data[max(start, len(data) - _UNWRITTEN) :]):
+                    return
+                raise
             at += len(fed) - len(member.unused_data if member.eof else member.unconsumed_tail)
             left -= len(parts[-1])
             if left < 0:

@@ -1,4 +1,4 @@
-"""What memory files must survive: kill -9 at any moment, a full disk, a read-only folder, and damage of any kind.
+"""What files must survive: kill -9 and power cuts at any moment, a full disk, a read-only folder, damage of any kind.
 
 ``python -m tests.torture`` runs all of it (``make torture``); tests/test_torture.py runs a little of each.
 """

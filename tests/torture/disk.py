@@ -1,7 +1,7 @@
 """A disk that is full, at many points of a write, and a folder that cannot be written: the old state stays.
 
 Root, for whom no folder is read-only, gets a file system
-of its own in a mount namespace of its own (``unshare --mount``): a tmpfs of 2 MiB that is filled up, and mounted anew
+of its own in a mount namespace of its own (``unshare --mount``): a tmpfs of 8 MiB that is filled up, and mounted anew
 read-only. Others, and root where mounting is not allowed, get a limit to the size of files (``RLIMIT_FSIZE``), and a
 folder without the right to write, as the user *nobody* if they are root.
 """
@@ -29,9 +29,10 @@ from atg_fg.storage import memory_files, memory_json
 from atg_fg.storage.database.checking import faults_of_database
 from atg_fg.storage.memory_files import open_memory
 from atg_fg.worlds.arcube import SUCCESSORS, make_arcubes, shown_pattern
+from tests.torture.commands import COMMANDS, command_outcomes
 
-SIZE = 2**21
-MOUNTED = "tmpfs of 2 MiB in a mount namespace"
+SIZE = 2**23
+MOUNTED = "tmpfs of 8 MiB in a mount namespace"
 LIMITED = "RLIMIT_FSIZE, and a folder without the right to write"
 _NOBODY = 65534
 #: Bytes that are left on the disk when a write begins: none, a page, … more than it needs.
@@ -39,41 +40,42 @@ LEFT = (0, 4096, 8192, 16384, 32768, 65536, 98304, 131072, 196608, 262144, 39321
 
 
 def main() -> None:
-    """Run all scenarios in a folder and print what came of them; arguments mounted|limited FOLDER N."""
-    way, folder, n_points = sys.argv[1], Path(sys.argv[2]), int(sys.argv[3])
+    """Run all scenarios in a folder and print what came of them; arguments mounted|limited FOLDER POINTS COMMANDS."""
+    way, folder, n_points, n_commands = sys.argv[1], Path(sys.argv[2]), int(sys.argv[3]), int(sys.argv[4])
     if way == "limited" and os.geteuid() == 0:
         os.setgroups([])
         os.setgid(_NOBODY)
         os.setuid(_NOBODY)
-    json.dump(outcomes(folder, n_points, mounted=way == "mounted"), sys.stdout)
+    json.dump(outcomes(folder, n_points, n_commands, mounted=way == "mounted"), sys.stdout)
 
 
-def run_scenarios(n_points: int = len(LEFT), *, mount: bool = True) -> dict[str, Any]:
+def run_scenarios(n_points: int = len(LEFT), n_commands: int = len(COMMANDS), *, mount: bool = True) -> dict[str, Any]:
     """Run all scenarios in another process; return the way it was done and how many came out well or not.
 
     Args:
         n_points: At how many points of a write the disk is full.
+        n_commands: How many of the commands that write are run on it.
         mount: Try to mount a file system.
     """
     with tempfile.TemporaryDirectory() as folder:
-        return _run_scenarios(folder, n_points, try_to_mount=mount)
+        return _run_scenarios(folder, [str(n_points), str(n_commands)], try_to_mount=mount)
 
 
-def _run_scenarios(folder: str, n_points: int, *, try_to_mount: bool) -> dict[str, Any]:
+def _run_scenarios(folder: str, numbers: list[str], *, try_to_mount: bool) -> dict[str, Any]:
     command = [sys.executable, "-m", "tests.torture.disk"]
     mount = f"mount -t tmpfs -o size={SIZE} tmpfs '{folder}'"
     if try_to_mount and os.geteuid() == 0 and shutil.which("unshare") and shutil.which("mount"):
         script = f'{mount} && exec "$@"'
-        inside = ["unshare", "--mount", "sh", "-c", script, "sh", *command, "mounted", folder, str(n_points)]
+        inside = ["unshare", "--mount", "sh", "-c", script, "sh", *command, "mounted", folder, *numbers]
         done = subprocess.run(inside, capture_output=True, text=True, check=False)
         if done.returncode == 0:
             return {"way": MOUNTED, **json.loads(done.stdout)}
     os.chmod(folder, 0o777)
-    done = subprocess.run([*command, "limited", folder, str(n_points)], capture_output=True, text=True, check=True)
+    done = subprocess.run([*command, "limited", folder, *numbers], capture_output=True, text=True, check=True)
     return {"way": LIMITED, **json.loads(done.stdout)}
 
 
-def outcomes(folder: Path, n_points: int, *, mounted: bool) -> dict[str, Any]:
+def outcomes(folder: Path, n_points: int, n_commands: int, *, mounted: bool) -> dict[str, Any]:
     """Return how many scenarios of each kind came out well, and what went wrong in the others."""
     disk = Mounted(folder) if mounted else Limited(folder)
     well: Counter[str] = Counter()
@@ -86,6 +88,9 @@ def outcomes(folder: Path, n_points: int, *, mounted: bool) -> dict[str, Any]:
             well[name] += fault is None
             faults += [] if fault is None else [f"{name}, {left} bytes left: {fault}"]
             shutil.rmtree(place)
+    for name, fault in command_outcomes(disk, n_points, n_commands):
+        well[f"full, atg-fg {name}"] += fault is None
+        faults += [] if fault is None else [f"full, {fault}"]
     for name, write in READ_ONLY.items():
         fault = read_only(disk, write)
         well[f"read-only, {name}"] += fault is None

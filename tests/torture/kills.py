@@ -7,6 +7,7 @@ more, and exactly what a memory has learned that went through as many trials.
 
 from __future__ import annotations
 
+import json
 import os
 import random
 import signal
@@ -14,6 +15,7 @@ import sqlite3
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Callable
 from contextlib import closing
 from pathlib import Path
 
@@ -23,14 +25,18 @@ from atg_fg.core.assumptions import arcube_assumptions
 from atg_fg.core.errors import AtgError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
-from atg_fg.core.records import TrialRecord
+from atg_fg.core.records import TrialRecord, TrialSummary
 from atg_fg.engines import begin_trial
+from atg_fg.experiments.ablation import AblationLog, Cell
+from atg_fg.experiments.scores import TestResult
 from atg_fg.experiments.trial import learn_from, run_trial
 from atg_fg.learning.search import SearchPlan
 from atg_fg.learning.structured_memory import StructuredMemory, memory_for
 from atg_fg.policies import RandomPolicy
-from atg_fg.storage import memory_json, plain_files
+from atg_fg.storage import memory_files, memory_json, plain_files
+from atg_fg.storage.checked_json import plain_json
 from atg_fg.storage.memory_files import open_memory
+from atg_fg.storage.trial_log import TrialLog, to_line
 from atg_fg.worlds.arcube import make_arcubes
 from atg_fg.worlds.registry import make_world
 
@@ -38,7 +44,9 @@ from atg_fg.worlds.registry import make_world
 N_TRIALS = 40
 #: A kill comes at most so many seconds after the fork, or after the first trial was begun.
 LONGEST = 0.06
-KINDS = ("database", "database with structure", "JSON")
+KINDS = ("database", "database with structure", "JSON", "arrays", "log of trials", "log of results")
+_SUFFIXES = {"JSON": ".json", "arrays": ".npz", "log of trials": ".jsonl.gz", "log of results": ".jsonl"}
+_CELL = Cell("default", "ideal", "ideal", 8)
 _PLAIN = ModelParameters()
 _LEARNED = ModelParameters(learn_structure=True)
 #: Next to no search: it is the writing that is to be cut off.
@@ -76,7 +84,7 @@ def kill_writers(n_kills: int, seed: int) -> tuple[Counter[str], list[str]]:
     """Return how many kills of each kind of file came out well, under its name, and what went wrong otherwise."""
     rng = random.Random(seed)
     courses = {"database": Course(structured=False), "database with structure": Course(structured=True)}
-    courses["JSON"] = courses["database"]
+    courses |= {kind: courses["database"] for kind in KINDS if kind not in courses}
     outcomes: Counter[str] = Counter()
     faults: list[str] = []
     with tempfile.TemporaryDirectory() as folder:
@@ -98,11 +106,14 @@ def kill_writers(n_kills: int, seed: int) -> tuple[Counter[str], list[str]]:
             if fault is not None or found == N_TRIALS:
                 generation[kind] += 1
                 written[kind] = 0
+        # The next writer in a folder removes what those before it have left.
+        plain_files.write_bytes_atomically(Path(folder) / "last", b"")
+        faults += [f"{each} was left behind" for each in Path(folder).glob(".atg-fg-*")]
     return outcomes, faults
 
 
 def _path(folder: str, kind: str, generation: int) -> Path:
-    return Path(folder) / f"{kind.replace(' ', '-')}-{generation}{'.json' if kind == 'JSON' else '.db'}"
+    return Path(folder) / f"{kind.replace(' ', '-')}-{generation}{_SUFFIXES.get(kind, '.db')}"
 
 
 def _run_and_kill(
@@ -118,7 +129,7 @@ def _run_and_kill(
         os.close(reading)
         status = 1
         try:
-            (_write_json if kind == "JSON" else _write_database)(path, course, written, writing)
+            WRITERS[kind](path, course, written, writing)
             status = 0
         finally:
             os._exit(status)
@@ -141,26 +152,55 @@ def _write_database(path: Path, course: Course, written: int, pipe: int) -> None
             os.write(pipe, b"e")
 
 
-def _write_json(path: Path, course: Course, written: int, pipe: int) -> None:
+def _write_whole(path: Path, course: Course, written: int, pipe: int) -> None:
     for state in course.states[written + 1 :]:
+        memory = memory_json.memory_from_json(state)
         os.write(pipe, b"b")
-        plain_files.write_bytes_atomically(path, state.encode())
+        memory_files.save_memory(memory, path)
         os.write(pipe, b"e")
+
+
+def _write_log(path: Path, course: Course, written: int, pipe: int) -> None:
+    log = trial_log(path)
+    log.resume()
+    for record in course.records[written:]:
+        os.write(pipe, b"b")
+        log.append(TrialSummary.of(record))
+        os.write(pipe, b"e")
+
+
+def _write_results(path: Path, course: Course, written: int, pipe: int) -> None:
+    log = AblationLog(path, N_TRIALS)
+    for number in range(written, len(course.records)):
+        os.write(pipe, b"b")
+        log.add(_CELL, TestResult(number, (1, 2), (2, 3), (1, 3)))
+        os.write(pipe, b"e")
+
+
+def trial_log(path: Path) -> TrialLog:
+    """A log of the trials of a course."""
+    return TrialLog(path, {"seed": 0}, arcube_assumptions())
+
+
+#: What is killed, for each kind of file.
+WRITERS: dict[str, Callable[[Path, Course, int, int], None]] = {
+    "database": _write_database,
+    "database with structure": _write_database,
+    "JSON": _write_whole,
+    "arrays": _write_whole,
+    "log of trials": _write_log,
+    "log of results": _write_results,
+}
 
 
 def _fault(kind: str, path: Path, course: Course, before: int, begun: int, ended: int) -> tuple[str | None, int]:
     """Return what is wrong with the file, if anything, and how many trials it holds."""
     if not path.exists() or path.stat().st_size == 0:
         return (None if ended == 0 else f"{ended} trials ended, but there is no file"), 0
-    if kind == "JSON":
-        text = path.read_text()
-        found = course.states.index(text) if text in course.states else -1
-        n_records = found
-    else:
-        try:
-            found, n_records = _found_in_database(path, course)
-        except (AtgError, sqlite3.Error) as error:
-            return f"{error}", before
+    try:
+        found, n_records = _FOUND.get(kind, found_in_database)(path, course)
+    except (AtgError, sqlite3.Error) as error:
+        return f"{error}", before
     if found == -1 or n_records != found:
         return f"{n_records} records, and the memory after {found} trials", before
     if found not in (ended, begun):
@@ -168,7 +208,37 @@ def _fault(kind: str, path: Path, course: Course, before: int, begun: int, ended
     return None, found
 
 
-def _found_in_database(path: Path, course: Course) -> tuple[int, int]:
+def _found_whole(path: Path, course: Course) -> tuple[int, int]:
+    text = memory_json.memory_to_json(memory_files.load_memory(path))
+    found = course.states.index(text) if text in course.states else -1
+    return found, found
+
+
+def found_in_log(path: Path, course: Course) -> tuple[int, int]:
+    """Return how many trials of the course a log holds, −1 if others, and how many it holds at all."""
+    trials = trial_log(path).resume()
+    expected = [to_line(TrialSummary.of(record)) for record in course.records[: len(trials)]]
+    same = [to_line(trial) for trial in trials] == json.loads(json.dumps(expected, default=plain_json))
+    return (len(trials) if same else -1), len(trials)
+
+
+def found_in_results(path: Path, course: Course) -> tuple[int, int]:
+    """Return how many results a log holds, twice; they are the same in every course."""
+    del course
+    log = AblationLog(path, N_TRIALS)
+    found = sum(log.get(_CELL, number) == TestResult(number, (1, 2), (2, 3), (1, 3)) for number in range(N_TRIALS))
+    return found, found
+
+
+_FOUND = {
+    "JSON": _found_whole,
+    "arrays": _found_whole,
+    "log of trials": found_in_log,
+    "log of results": found_in_results,
+}
+
+
+def found_in_database(path: Path, course: Course) -> tuple[int, int]:
     """Return after how many trials the memory is what it is, −1 if after none, and how many records there are."""
     with closing(sqlite3.connect(path)) as connection:
         if connection.execute("SELECT count(*) FROM sqlite_master").fetchone() == (0,):

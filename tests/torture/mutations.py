@@ -1,39 +1,31 @@
-"""Files of every kind that this project reads, damaged at random: file number i of a seed is always the same bytes."""
+"""Files of every kind that this project reads, damaged at random: file number i of a seed is always the same bytes.
+
+Where bytes alone would never get past the first check (a checksum, a page, the directory of an archive), what is in
+them is damaged, and packed as it should be.
+"""
 
 from __future__ import annotations
 
+import copy
+import io
 import json
 import os
 import random
 import sqlite3
 import tempfile
+import zipfile
+from collections.abc import Callable
 from contextlib import closing
-from functools import cache
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
+from xml.etree import ElementTree
 
 import numpy as np
 
-from atg_fg.core.assumptions import arcube_assumptions
-from atg_fg.core.memory import RobotMemory
-from atg_fg.core.parameters import ModelParameters
-from atg_fg.engines import begin_trial
-from atg_fg.experiments.trial import learn_from, run_trial
-from atg_fg.learning.structured_memory import memory_for
-from atg_fg.policies import RandomPolicy
-from atg_fg.storage import memory_files, memory_json
-from atg_fg.storage.memory_files import open_memory
-from atg_fg.storage.scripted_trial import read_script
-from atg_fg.storage.uai import write_evidence, write_model
-from atg_fg.storage.uai_export import export_trial
-from atg_fg.worlds.arcube import make_arcubes
-from atg_fg.worlds.registry import make_world
+from tests.torture.originals import originals, packed, unpacked
 
 #: Where files are in RAM, so that the time is the reader's own.
 FAST = "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
-KINDS = ("memory", "structured memory", "script", "UAI model", "UAI evidence", "database", "structured database")
-_SCRIPT = Path(__file__).parents[1] / "data" / "scripted_trial.json"
-_UAI = "MARKOV\n3\n2 3 2\n3\n2 0 1\n1 2\n3 0 1 2\n\n6\n1 2 3 4 5 6.5\n2\n0 1\n12\n" + "0.5 1e-3 2 7 0 1 " * 2 + "\n"
 _WORDS = (
     *("0", "1", "-1", "2", "3", "64", "65", "1000", "100000", "4294967296", "9007199254740993", "18446744073709551616"),
     *("1e400", "1e-400", "-0.0", "0.1", "1.5", "NaN", "Infinity", "-Infinity", "null", "true", "false", '""', "[]"),
@@ -47,32 +39,137 @@ _VALUES: tuple[Any, ...] = (
 )
 
 
-@cache
-def originals() -> dict[str, list[bytes]]:
-    """Sound files of each kind."""
-    plain, structured = _memory(structured=False, n_trials=5), _memory(structured=True, n_trials=2)
-    exported = export_trial(read_script(_SCRIPT.read_text()))
-    return {
-        "memory": [memory_json.memory_to_json(plain).encode()],
-        "structured memory": [memory_json.memory_to_json(structured).encode()],
-        "script": [_SCRIPT.read_bytes(), _long_script()],
-        "UAI model": [_UAI.encode(), write_model(exported.model).encode()],
-        "UAI evidence": [b"2 0 1 2 0\n", b"1\n1 3 2\n", write_evidence(exported.evidence).encode()],
-        "database": [_database(plain, n_trials=4)],
-        "structured database": [_database(structured, n_trials=1)],
-    }
-
-
-def mutated(seed: int, number: int) -> tuple[str, bytes]:
+def mutated(seed: int, number: int, kinds: tuple[str, ...] | None = None) -> tuple[str, bytes]:
     """Return kind and content of a damaged file."""
     rng = random.Random(f"{seed}:{number}")
-    kind = KINDS[number % len(KINDS)]
+    there = kinds or tuple(originals())
+    kind = there[number % len(there)]
     content = rng.choice(originals()[kind])
-    if "database" in kind:
-        return kind, _damaged_database(rng, content) if rng.random() < 0.5 else _damaged_bytes(rng, content)
-    if "UAI" not in kind and rng.random() < 0.6:
+    inside = _INSIDE.get(kind)
+    if inside is not None and rng.random() < (0.5 if "database" in kind else 0.8):
+        return kind, inside(rng, content)
+    is_text = kind not in _INSIDE or kind in ("trial record", "ablation log", "URDF")
+    if is_text and "UAI" not in kind and kind not in _INSIDE and rng.random() < 0.6:
         return kind, _damaged_document(rng, content)
-    return kind, _damaged_words(rng, content) if rng.random() < 0.7 else _damaged_bytes(rng, content)
+    return kind, _damaged_words(rng, content) if is_text and rng.random() < 0.7 else _damaged_bytes(rng, content)
+
+
+def _damaged_lines(rng: random.Random, lines: list[bytes]) -> list[bytes]:
+    """Return the lines of a log with some of them damaged, repeated, left out, or put elsewhere."""
+    lines = list(lines)
+    for _ in range(rng.choice((1, 1, 2, 4))):
+        where = rng.randrange(len(lines))
+        change = rng.randrange(8)
+        if change < 5:
+            lines[where] = _damaged_document(rng, lines[where])
+        elif change == 5:
+            lines[where:where] = [lines[where]] * rng.choice((1, 2, 200))
+        elif change == 6 and len(lines) > 1:
+            del lines[where]
+        else:
+            rng.shuffle(lines)
+        if not any(lines):
+            break
+    return lines
+
+
+def _damaged_log(rng: random.Random, content: bytes) -> bytes:
+    return packed(_damaged_lines(rng, unpacked(content)))
+
+
+def _damaged_text_log(rng: random.Random, content: bytes) -> bytes:
+    return b"".join(line + b"\n" for line in _damaged_lines(rng, content.splitlines()))
+
+
+def _damaged_packed_document(rng: random.Random, content: bytes) -> bytes:
+    return packed([_damaged_document(rng, b"".join(unpacked(content)))])
+
+
+def _damaged_arrays(rng: random.Random, content: bytes) -> bytes:
+    """Return a file of arrays with other numbers, lengths or types, or with other arrays."""
+    with np.load(io.BytesIO(content)) as file:
+        arrays = {name: file[name] for name in file.files}
+    for _ in range(rng.choice((1, 1, 2, 3))):
+        name = rng.choice(list(arrays))
+        array, change = arrays[name], rng.randrange(8)
+        if name == "header" and rng.random() < 0.7:
+            document = _damaged_document(rng, array.astype(np.uint8).tobytes())
+            arrays[name] = np.frombuffer(document, dtype=np.uint8)
+        elif change < 3 and array.size:
+            array = array.astype(np.int64)
+            array.flat[rng.randrange(array.size)] = rng.choice(
+                (-1, 0, 1, 5, 24, 255, 2**31, 2**53, 2**63 - 1, -(2**63))
+            )
+            arrays[name] = array
+        elif change == 3 and array.ndim:
+            arrays[name] = array[: rng.randrange(array.size + 1)]
+        elif change == 4 and array.ndim:
+            arrays[name] = np.concatenate([array] * rng.choice((2, 3, 100)))
+        elif change == 5:
+            kind = rng.choice(("f8", "i1", "u1", "i2", "u8", "?", "c16", "S3", "U2", "M8[s]"))
+            with np.errstate(all="ignore"):
+                arrays[name] = array.astype(kind)
+        elif change == 6:
+            arrays[name] = rng.choice((array.reshape(1, -1), np.zeros((0, 3), dtype=np.int64), np.array(5)))
+        else:
+            arrays.pop(name) if rng.random() < 0.5 else arrays.update({"more": array})
+        if not arrays:
+            break
+    file = io.BytesIO()
+    save = np.savez_compressed if rng.random() < 0.3 else np.savez
+    save(file, **arrays)
+    return _with_other_headers(rng, file.getvalue()) if rng.random() < 0.2 else file.getvalue()
+
+
+def _with_other_headers(rng: random.Random, content: bytes) -> bytes:
+    """Return an archive in which the head of an array says something else of it."""
+    file = io.BytesIO()
+    with zipfile.ZipFile(io.BytesIO(content)) as source, zipfile.ZipFile(file, "w", zipfile.ZIP_DEFLATED) as target:
+        for name in source.namelist():
+            data, head = source.read(name), io.BytesIO()
+            if rng.random() < 0.4:
+                shape = rng.choice(((10**12,), (-1,), (2**40, 2), (), (3,), (10**400,)))
+                said = {"descr": rng.choice(("<i8", "|u1", "|O", "<U9")), "fortran_order": False, "shape": shape}
+                np.lib.format.write_array_header_2_0(head, said)
+                data = head.getvalue() + data[128:]
+            elif rng.random() < 0.3:
+                data = _damaged_bytes(rng, data[:128]) + data[128:]
+            target.writestr(name, data)
+    return file.getvalue()
+
+
+def _damaged_xml(rng: random.Random, content: bytes) -> bytes:
+    """Return a tree of elements with attributes, elements or names of them exchanged."""
+    root = ElementTree.fromstring(content)
+    for _ in range(rng.choice((1, 1, 2, 4))):
+        elements = list(root.iter())
+        element, change = rng.choice(elements), rng.randrange(6)
+        if change < 3 and element.attrib:
+            element.set(rng.choice(list(element.attrib)), rng.choice(_XML_VALUES))
+        elif change == 3 and len(element):
+            element.remove(rng.choice(list(element)))
+        elif change == 4 and len(elements) < 5000:
+            copied = [copy.deepcopy(each) for each in rng.choice(elements)]
+            element.extend(copy.deepcopy(each) for each in copied * rng.choice((1, 2, 50)))
+        else:
+            element.tag = rng.choice(elements).tag
+    return ElementTree.tostring(root)
+
+
+_XML_VALUES: Final = (
+    *("", "nan", "inf", "-1", "1e400", "0 0", "0 0 0 0", "1 0 0", "9" * 400, "base", "arm", "hand", "r", "shoulder"),
+    *(
+        "../../../../etc/passwd",
+        "package://r/../../a.stl",
+        "file:///dev/zero",
+        "/dev/stdin",
+        "x" * 10**5,
+        "\u2028",
+        "mesh",
+    ),
+)
+#: What is damaged inside of a file that is packed anew, by kind.
+_INSIDE: Final[dict[str, Callable[[random.Random, bytes], bytes]]] = {}
 
 
 def _damaged_bytes(rng: random.Random, content: bytes) -> bytes:
@@ -121,7 +218,7 @@ def _damaged_words(rng: random.Random, content: bytes) -> bytes:
 def _damaged_document(rng: random.Random, content: bytes) -> bytes:
     """Return a JSON document with some of its values replaced, repeated, moved or left out, or made large."""
     document = json.loads(content)
-    if rng.random() < 0.25:
+    if isinstance(document, dict) and "assumptions" in document and "memory" in document and rng.random() < 0.25:
         _enlarge(rng, document)
         if rng.random() < 0.7:
             return json.dumps(document).encode()
@@ -212,34 +309,13 @@ def _damage_table(rng: random.Random, connection: sqlite3.Connection, table: str
         connection.execute("UPDATE sqlite_master SET sql = ? WHERE name = ?", (sql, table))
 
 
-def _memory(*, structured: bool, n_trials: int) -> RobotMemory:
-    memory = memory_for(ModelParameters(learn_structure=structured), RobotMemory(arcube_assumptions()))
-    _learn(memory, n_trials)
-    memory.merge(memory.names[0], memory.names[-1])
-    return memory
-
-
-def _learn(memory: RobotMemory, n_trials: int) -> None:
-    with closing(make_world("ideal", cubes=make_arcubes(4, seed=0))) as world:
-        for number in range(n_trials):
-            inference = begin_trial("bayes-filter", memory, ModelParameters())
-            learn_from(run_trial(world, inference, RandomPolicy(), 6, np.random.default_rng(number)), memory)
-
-
-def _database(memory: RobotMemory, n_trials: int) -> bytes:
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "robot.db"
-        memory_files.save_memory(memory, path)
-        with open_memory(path) as opened:
-            opened.begin_experiment("torture", {"actions": 6}, seed=0)
-            _learn(opened, n_trials)
-        return path.read_bytes()
-
-
-def _long_script() -> bytes:
-    """A script with several ATGs and many steps."""
-    document = json.loads(_SCRIPT.read_bytes())
-    document["memory"] = json.loads(memory_json.memory_to_json(_memory(structured=False, n_trials=5)))["memory"]
-    steps = [{"act": "flip"}, {"observe": [1, None]}, {"act": "left"}, {"observe": [None, 3]}]
-    document["steps"] = [{"observe": [0, 1]}, *steps * 3]
-    return json.dumps(document).encode()
+_INSIDE |= {
+    "database": _damaged_database,
+    "structured database": _damaged_database,
+    "compact memory": _damaged_arrays,
+    "test log": _damaged_log,
+    "goal run": _damaged_packed_document,
+    "trial record": _damaged_text_log,
+    "ablation log": _damaged_text_log,
+    "URDF": _damaged_xml,
+}

@@ -16,20 +16,39 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
+from atg_fg.core.assumptions import arcube_assumptions
 from atg_fg.core.errors import AtgError
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.experiments.ablation import AblationLog, Cell
+from atg_fg.experiments.goals import GoalRunFile
 from atg_fg.experiments.replay import replay
+from atg_fg.experiments.rescore import rescore
 from atg_fg.inference.elimination.queries import log_partition, marginals
+from atg_fg.report.page import page
+from atg_fg.report.reading import read_report
 from atg_fg.storage import memory_files, memory_json, plain_files
+from atg_fg.storage.camera_files import read_calibration, read_tags
 from atg_fg.storage.database.checking import faults_of_database
+from atg_fg.storage.database.connection import writing
+from atg_fg.storage.database.copying import add_records, records_in_log
+from atg_fg.storage.database.repairing import repair_database
+from atg_fg.storage.growing_file import read_lines
 from atg_fg.storage.memory_files import open_memory
+from atg_fg.storage.presets import preset
+from atg_fg.storage.recorded_test import recorded_tests
 from atg_fg.storage.scripted_trial import read_script
+from atg_fg.storage.trial_log import TrialLog
 from atg_fg.storage.uai import read_evidence, read_model
-from tests.torture.mutations import FAST, mutated, originals
+from sim.bodies.urdf_reader import read_urdf
+from sim.noise_calibration import calibrate, read_counts
+from tests.torture.mutations import FAST, mutated
+from tests.torture.originals import originals
 
 #: What a file may take: seconds of processor time, and bytes beyond what the process had before.
 MAX_SECONDS = 1.0
@@ -41,6 +60,8 @@ _HANGS = 10
 _LIMIT = 2**18
 #: Objects times steps times patterns up to which a script is replayed.
 _SHORT = 20_000
+#: Trials, and patterns, up to which a test is rescored.
+_FEW_TRIALS, _FEW_PATTERNS = 10, 200
 
 
 def read_damaged(n_files: int, seed: int, processes: int = 1) -> dict[str, Any]:
@@ -141,39 +162,77 @@ def measured(kind: str, content: bytes, folder: Path) -> dict[str, Any]:
 
 def read_as(kind: str, content: bytes, folder: Path) -> None:
     """Do with a file what commands do with files of its kind."""
-    path = folder / "damaged"
     for each in folder.iterdir():
         each.unlink()
+    path = folder / f"damaged{SUFFIXES.get(kind, '')}"
     path.write_bytes(content)
-    if "database" in kind:
-        _use_database(path)
-    elif "memory" in kind:
-        memory_json.memory_to_json(memory_files.load_memory(path))
-    elif kind == "script":
-        script = read_script(plain_files.read_text_file(path), str(path))
-        # A sound script may ask for a long trial among many objects. To answer it is work, and no failure.
-        if (len(script.memory) + 1) * len(script.steps) * len(script.memory.assumptions.alphabet) <= _SHORT:
-            replay(script, "gtsam", smooth=True)
-    elif kind == "UAI model":
-        model = read_model(plain_files.read_text_file(path), str(path))
-        log_partition(model, limit=_LIMIT)
-        marginals(model, limit=_LIMIT)
-    else:
-        evidence = read_evidence(plain_files.read_text_file(path), str(path))
-        original = read_model(originals()["UAI model"][-1].decode())
-        original.check_evidence(evidence)
+    READERS[kind](path)
 
 
-def _use_database(path: Path) -> None:
-    """Check, load, learn in place: what one of these refuses the next ones must refuse or survive, too."""
-    errors: list[AtgError] = []
-    for use in (faults_of_database, memory_files.load_memory, _learn_in_place):
-        try:
-            use(path)
-        except AtgError as error:
-            errors.append(error)
-    if errors:
-        raise errors[0]
+def _use_memory(path: Path) -> None:
+    memory_json.memory_to_json(memory_files.load_memory(path))
+
+
+def _replay(path: Path) -> None:
+    script = read_script(plain_files.read_text_file(path), str(path))
+    # A sound script may ask for a long trial among many objects. To answer it is work, and no failure.
+    if (len(script.memory) + 1) * len(script.steps) * len(script.memory.assumptions.alphabet) <= _SHORT:
+        replay(script, "gtsam", smooth=True)
+
+
+def _solve(path: Path) -> None:
+    model = read_model(plain_files.read_text_file(path), str(path))
+    log_partition(model, limit=_LIMIT)
+    marginals(model, limit=_LIMIT)
+
+
+def _use_evidence(path: Path) -> None:
+    evidence = read_evidence(plain_files.read_text_file(path), str(path))
+    original = read_model(originals()["UAI model"][-1].decode())
+    original.check_evidence(evidence)
+
+
+def _report(path: Path) -> None:
+    page(read_report(path))
+
+
+def _all_of(*uses: Callable[[Path], object]) -> Callable[[Path], None]:
+    """Return what does all of these: what one of them refuses the next ones must refuse or survive, too."""
+
+    def use_all(path: Path) -> None:
+        errors: list[AtgError] = []
+        for use in uses:
+            try:
+                use(path)
+            except AtgError as error:
+                errors.append(error)
+        if errors:
+            raise errors[0]
+
+    return use_all
+
+
+def _rescore(path: Path) -> None:
+    for test in recorded_tests(path):
+        if len(test.trials) <= _FEW_TRIALS and len(test.assumptions.alphabet) <= _FEW_PATTERNS:
+            rescore(test, "bayes-filter", ModelParameters())
+
+
+def _import(path: Path) -> None:
+    """Import a log into a database, which must be sound afterwards."""
+    into = path.with_name("into.db")
+    experiment, trials = records_in_log(path)
+    with writing(into, create=True) as connection:
+        add_records(connection, str(into), [(experiment, trials)])
+    faults = faults_of_database(into)
+    assert not faults, faults
+
+
+def _resume(path: Path) -> None:
+    """Go on with a log under its own header, so that all of its lines are read."""
+    header = read_lines(path, packed=True)[:1]
+    if header and isinstance(header[0], dict):
+        TrialLog(path, header[0], arcube_assumptions()).resume()
 
 
 def _learn_in_place(path: Path) -> None:
@@ -184,6 +243,39 @@ def _learn_in_place(path: Path) -> None:
         assert sum(1 for _ in memory.trials()) == n_trials
         if len(memory) > 1:
             memory.merge(memory.names[0], memory.names[1])
+
+
+#: What is done with files of each kind.
+READERS: Final[dict[str, Callable[[Path], None]]] = {
+    "memory": _use_memory,
+    "structured memory": _use_memory,
+    "compact memory": _use_memory,
+    "script": _replay,
+    "UAI model": _solve,
+    "UAI evidence": _use_evidence,
+    "database": _all_of(
+        faults_of_database, memory_files.load_memory, _rescore, _report, repair_database, _learn_in_place
+    ),
+    "structured database": _all_of(faults_of_database, memory_files.load_memory, _report, _learn_in_place),
+    "test log": _all_of(_report, _rescore, _import, _resume),
+    "trial record": _report,
+    "goal run": _all_of(_report, lambda path: GoalRunFile(path, {"seed": 0, "run": 0}).read()),
+    "result": _report,
+    "ablation log": lambda path: AblationLog(path, 5).get(Cell("default", "ideal", "ideal", 4), 0) and None,
+    "preset": lambda path: preset(str(path)) and None,
+    "counts": lambda path: calibrate(read_counts([path])) and None,
+    "tags": lambda path: read_tags(path) and None,
+    "calibration": lambda path: read_calibration(path) and None,
+    "URDF": lambda path: read_urdf(path) and None,
+}
+SUFFIXES: Final = {
+    "compact memory": ".npz",
+    "test log": ".jsonl.gz",
+    "goal run": ".json.gz",
+    "trial record": ".jsonl",
+    "preset": ".json",
+    "URDF": ".urdf",
+}
 
 
 def _limit_address_space() -> None:

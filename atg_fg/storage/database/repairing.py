@@ -71,7 +71,7 @@ def _taken_out(connection: sqlite3.Connection, key: int, fault: str) -> dict[str
         connection.text_factory = str
     connection.execute("DELETE FROM steps WHERE trial = ?", (key,))
     connection.execute("DELETE FROM trials WHERE id = ?", (key,))
-    return {"fault": fault, "trial": _as_text(trial), "steps": [_as_text(step) for step in steps]}
+    return {"fault": fault, "trial": _as_text(trial or ()), "steps": [_as_text(step) for step in steps]}
 
 
 def _as_text(row: tuple[Any, ...]) -> list[str | None]:

@@ -149,9 +149,10 @@ def trials_or_faults(
         assumptions: Of the trials of each experiment, where they are known.
     """
     for key in _keys(connection, place):
-        (experiment,) = connection.execute("SELECT experiment FROM trials WHERE id = ?", (key,)).fetchone()
+        where = f"{place}: trial {key!r}"
         try:
-            yield key, _trial(connection, key, f"{place}: trial {key!r}", assumptions.get(experiment))
+            (experiment,) = _row(connection, "SELECT experiment FROM trials WHERE id = ?", key, where)
+            yield key, _trial(connection, key, where, assumptions.get(experiment))
         except InvalidInputError as error:
             yield key, error
 

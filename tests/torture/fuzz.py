@@ -1,0 +1,111 @@
+"""Coverage-guided fuzzing of all readers with atheris: ``python -m tests.torture.fuzz --seconds 3600``.
+
+An input is a byte that says the kind of the file, and what is in it. What files of that kind are packed in (gzip
+members, an archive) is put around it, so that the readers behind it are reached. An input that leads to anything but an
+error of this project is kept in a folder and named. What reached new code is added to the corpus, of which only the
+smallest files that reach as much are kept (``tests/torture/corpus``).
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from tests.torture.originals import packed, unpacked
+
+CORPUS = Path(__file__).parent / "corpus"
+#: Kinds in the order of the byte that says them; a new one is put at the end, as the corpus tells them by number.
+KINDS = (
+    *("memory", "structured memory", "compact memory", "script", "UAI model", "UAI evidence", "database", "test log"),
+    *("trial record", "goal run", "result", "ablation log", "preset", "counts", "tags", "calibration", "URDF"),
+)
+#: Longer inputs are not made.
+_MAX_BYTES = 20_000
+#: What one input may take: seconds, and MiB of RAM of the whole process.
+_SECONDS, _MEBIBYTES = 10, 2048
+
+
+#: Kinds whose lines are packed each by itself.
+_PACKED = ("test log", "goal run")
+
+
+def as_input(kind: str, content: bytes) -> bytes:
+    """Return the input that stands for a file."""
+    return bytes([KINDS.index(kind)]) + (b"\n".join(unpacked(content)) if kind in _PACKED else content)
+
+
+def as_file(data: bytes) -> tuple[str, bytes]:
+    """Return kind and content of the file that an input stands for."""
+    kind, content = KINDS[data[0] % len(KINDS)], data[1:]
+    return kind, packed(content.split(b"\n")) if kind in _PACKED else content
+
+
+def main() -> int:
+    """Fuzz for some time, print what came of it, and return 1 if a fault was found."""
+    parser = argparse.ArgumentParser(prog="python -m tests.torture.fuzz", description=__doc__)
+    parser.add_argument("--seconds", type=int, default=3600)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--keep", action="store_true", help="add what reached new code to the corpus in the repository")
+    given = parser.parse_args()
+    result = fuzz(given.seconds, given.seed, keep=given.keep)
+    print(result["line"])
+    for fault in result["faults"]:
+        print(fault)
+    return 1 if result["faults"] else 0
+
+
+def fuzz(seconds: int, seed: int, *, keep: bool = False) -> dict[str, Any]:
+    """Fuzz for so many seconds in other processes, one after the other where one dies; return what came of it."""
+    left, n_runs, covered, faults = seconds, 0, 0, []
+    with tempfile.TemporaryDirectory() as folder:
+        grown, found = Path(folder) / "grown", Path(folder) / "found"
+        grown.mkdir()
+        found.mkdir()
+        while left > 0 and len(faults) < 10:
+            options = [f"-max_total_time={left}", f"-seed={seed + len(faults)}", f"-artifact_prefix={found}/"]
+            options += [f"-max_len={_MAX_BYTES}", f"-timeout={_SECONDS}", f"-rss_limit_mb={_MEBIBYTES}"]
+            output = _fuzzer(*options, "-print_final_stats=1", str(grown), str(CORPUS))
+            n_runs += sum(map(int, re.findall(r"stat::number_of_executed_units: (\d+)", output)))
+            covered = max([covered, *map(int, re.findall(r"cov: (\d+)", output))])
+            left -= max(1, *map(int, re.findall(r"in (\d+) second", output) or ["0"]))
+            artifacts = [each for each in found.iterdir() if each.stat().st_size]
+            if not artifacts:
+                break
+            for artifact in artifacts:
+                said = re.findall(r"^(?:\w+Error|\w+Exception|ERROR|==\d+==).*$", output, re.MULTILINE)
+                kept = Path(tempfile.gettempdir()) / f"fuzz-{artifact.name}"
+                artifact.replace(kept)
+                faults.append(f"{kept}: {said[0] if said else output[-300:]!r}")
+        if keep:
+            with tempfile.TemporaryDirectory() as merged:
+                _fuzzer("-merge=1", merged, str(CORPUS), str(grown))
+                for each in CORPUS.iterdir():
+                    each.unlink()
+                for each in Path(merged).iterdir():
+                    (CORPUS / each.name[:16]).write_bytes(each.read_bytes())
+        n_corpus = sum(1 for _ in grown.iterdir())
+    line = (
+        f"fuzzing: {n_runs} inputs in {seconds - left} s, {covered} places in the code reached, {n_corpus} inputs that "
+        f"reached new ones; {len(faults)} faults"
+    )
+    return {"line": line, "runs": n_runs, "faults": faults}
+
+
+def _fuzzer(*options: str) -> str:
+    command = [sys.executable, "-m", "tests.torture.fuzz_target", *options]
+    done = subprocess.run(command, capture_output=True, text=True, errors="replace", check=False, env=_environment())
+    return done.stdout + done.stderr
+
+
+def _environment() -> dict[str, str]:
+    return {**os.environ, "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
+
+
+if __name__ == "__main__":
+    sys.exit(main())
