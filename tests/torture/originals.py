@@ -21,7 +21,6 @@ from atg_fg.experiments.ablation import AblationLog, Cell
 from atg_fg.experiments.scores import TestResult
 from atg_fg.experiments.table1 import TestPlan, run_tests
 from atg_fg.experiments.trial import learn_from, run_trial
-from atg_fg.learning.structured_memory import memory_for
 from atg_fg.policies import EntropyPolicy, RandomPolicy
 from atg_fg.storage import memory_files, memory_json
 from atg_fg.storage.camera_files import CALIBRATION_FORMAT
@@ -71,23 +70,20 @@ _ROBOT = """<robot name="r"><material name="grey"><color rgba="0.5 0.5 0.5 1"/><
 @cache
 def originals() -> dict[str, list[bytes]]:
     """Sound files of each kind, and those of all versions that were ever written."""
-    plain, structured = _memory(structured=False, n_trials=5), _memory(structured=True, n_trials=2)
-    exported = export_trial(read_script(_SCRIPT.read_text()))
     formats = _DATA / "formats"
+    plain, structured = _memory(5), memory_files.load_memory(formats / "memory-1-structured.json")
+    exported = export_trial(read_script(_SCRIPT.read_text()))
     with tempfile.TemporaryDirectory() as folder:
         logs = _logs(Path(folder))
     return {
         "memory": [memory_json.memory_to_json(plain).encode(), (formats / "memory-1.json").read_bytes()],
-        "structured memory": [
-            memory_json.memory_to_json(structured).encode(),
-            (formats / "memory-1-structured.json").read_bytes(),
-        ],
+        "structured memory": [(formats / "memory-1-structured.json").read_bytes()],
         "compact memory": [_compact(plain)],
         "script": [_SCRIPT.read_bytes(), _long_script()],
         "UAI model": [_UAI.encode(), write_model(exported.model).encode()],
         "UAI evidence": [b"2 0 1 2 0\n", b"1\n1 3 2\n", write_evidence(exported.evidence).encode()],
         "database": [_database(plain, n_trials=4), (formats / "memory-schema-1.db").read_bytes()],
-        "structured database": [_database(structured, n_trials=1)],
+        "structured database": [_database(structured, n_trials=0)],
         "test log": [*logs["test log"], (formats / "test-1.jsonl.gz").read_bytes()],
         "trial record": [_trial_record()],
         "goal run": [(formats / "goal-run-1.json.gz").read_bytes()],
@@ -104,8 +100,8 @@ def originals() -> dict[str, list[bytes]]:
     }
 
 
-def _memory(*, structured: bool, n_trials: int) -> RobotMemory:
-    memory = memory_for(ModelParameters(learn_structure=structured), RobotMemory(arcube_assumptions()))
+def _memory(n_trials: int) -> RobotMemory:
+    memory = RobotMemory(arcube_assumptions())
     _learn(memory, n_trials)
     memory.merge(memory.names[0], memory.names[-1])
     return memory
@@ -139,7 +135,7 @@ def _compact(memory: RobotMemory) -> bytes:
 def _long_script() -> bytes:
     """A script with several ATGs and many steps."""
     document = json.loads(_SCRIPT.read_bytes())
-    document["memory"] = json.loads(memory_json.memory_to_json(_memory(structured=False, n_trials=5)))["memory"]
+    document["memory"] = json.loads(memory_json.memory_to_json(_memory(5)))["memory"]
     steps = [{"act": "flip"}, {"observe": [1, None]}, {"act": "left"}, {"observe": [None, 3]}]
     document["steps"] = [{"observe": [0, 1]}, *steps * 3]
     return json.dumps(document).encode()
@@ -158,7 +154,7 @@ def _logs(folder: Path) -> dict[str, list[bytes]]:
 
 
 def _trial_record() -> bytes:
-    memory = _memory(structured=False, n_trials=4)
+    memory = _memory(4)
     with closing(make_world("ideal", cubes=make_arcubes(4, seed=0))) as world:
         inference = begin_trial("bayes-filter", memory, ModelParameters())
         record: TrialRecord = run_trial(world, inference, EntropyPolicy(), 5, np.random.default_rng(0))
