@@ -12,6 +12,7 @@ import ctypes
 import ctypes.util
 import os
 import random
+import sqlite3
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager
@@ -154,7 +155,7 @@ class _Watch:
             path = Path(folder) / self.path.name
             try:
                 found, n_records = (0, 0) if not path.exists() or not path.stat().st_size else self._found_in(path)
-            except AtgError as error:
+            except (AtgError, sqlite3.Error) as error:
                 self.faults.append(f"{self._name}, {self.ended} trials ended: {error}")
                 return
         if found != n_records or not self.ended <= found <= self.begun:
