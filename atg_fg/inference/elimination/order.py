@@ -6,11 +6,19 @@ import heapq
 import math
 from collections.abc import Iterable, Sequence
 from itertools import combinations
-from typing import NamedTuple, TypeAlias
+from typing import Final, NamedTuple, TypeAlias
 
 from atg_fg.core.errors import TooLargeError
 
-_BYTES_PER_ENTRY = 8
+_BYTES_PER_ENTRY: Final = 8
+
+
+#: Entries that all tables may have which are made in turn and not kept, or 64 times the limit: they cost time.
+IN_TURN: Final = 2**32
+
+
+#: Pairs of neighbours that are looked at to say what an order needs, after its first table above the limit: a second.
+MOST_WORK: Final = 1_000_000
 
 
 #: Fill edges (or a bound below them), logarithm of the table's size, the variable; then whether the number is exact,
@@ -22,20 +30,22 @@ class EliminationOrder(NamedTuple):
     """An order of elimination and what it costs.
 
     Attributes:
-        variables: All variables, the first to be eliminated first.
+        variables: The variables, the first to be eliminated first; all of them, unless that takes too long.
         entries: Size of the table that each is summed out of, in the same order.
+        is_complete: Whether these are all variables.
     """
 
     variables: tuple[int, ...]
     entries: tuple[int, ...]
+    is_complete: bool
 
 
 class EntryBudget(NamedTuple):
-    """How many entries tables may have; they are counted before they are made.
+    """How many entries tables may have; they are counted before the first is made, for memory and for time.
 
     Attributes:
-        limit: The most entries.
-        together: Whether the limit is for all tables together, because all are kept, or for each of them.
+        limit: The most entries of all tables together if all are kept, else of the largest (then see ``IN_TURN``).
+        together: Whether all are kept.
         taken: Entries that are kept besides.
     """
 
@@ -43,19 +53,22 @@ class EntryBudget(NamedTuple):
     together: bool = False
     taken: int = 0
 
-    def check(self, entries: int, total: int) -> None:
-        """Check a table of ``entries``, which makes ``total`` with all those before it.
-
-        Raises:
-            TooLargeError: It is above the limit.
-        """
-        needed = self.taken + total if self.together else entries
-        if needed > self.limit:
-            what = "tables of together" if self.together else "a table of"
-            raise TooLargeError(
-                f"elimination: would need {what} at least {_shown(needed)} entries "
-                f"({_shown(needed * _BYTES_PER_ENTRY)} bytes); the limit is {self.limit} entries"
-            )
+    def excess(self, order: EliminationOrder) -> str | None:
+        """Return what an order would need, if that is too much."""
+        total, largest = self.taken + sum(order.entries), max(order.entries, default=0)
+        if self.together:
+            needs = [("tables of together", total, self.limit)]
+        else:
+            needs = [
+                ("a table of", largest, self.limit),
+                ("to make tables in turn, of", total, max(IN_TURN, 64 * self.limit)),
+            ]
+        for what, needed, limit in needs:
+            if needed > limit:
+                shown, more = (_shown, "") if order.is_complete else (_power, "more than ")
+                size = f"{more}{shown(needed)} entries ({more}{shown(needed * _BYTES_PER_ENTRY)} bytes)"
+                return f"elimination: would need {what} {size}; the limit is {limit} entries"
+        return None
 
 
 def best_order(scopes: Sequence[Sequence[int]], sizes: Sequence[int], budget: EntryBudget) -> EliminationOrder:
@@ -66,35 +79,34 @@ def best_order(scopes: Sequence[Sequence[int]], sizes: Sequence[int], budget: En
     Args:
         scopes: The variables of each factor.
         sizes: Number of states of each variable.
-        budget: Counts the table of each step.
+        budget: What the tables may need.
 
     Raises:
-        TooLargeError: Both orders need more than the budget. An order is given up at the first table that is too
-            large, so the message says *at least*.
+        TooLargeError: Both orders need more than the budget; the message says what the better one needs, or *more than*
+            what was counted if its tables are so many or so large that counting them all would take too long.
     """
-    orders, refusals = [], []
-    for by_number in (False, True):
-        try:
-            orders.append(_order(_FillGraph(scopes, sizes), by_number, budget))
-        except TooLargeError as error:
-            refusals.append(error)
-    if not orders:
-        raise refusals[0]
-    return min(orders, key=lambda order: sum(order.entries))
+    orders = [_order(_FillGraph(scopes, sizes), by_number, budget) for by_number in (False, True)]
+    best = min(orders, key=lambda order: (budget.excess(order) is not None, not order.is_complete, sum(order.entries)))
+    excess = budget.excess(best)
+    if excess is not None:
+        raise TooLargeError(excess)
+    return best
 
 
 def _order(graph: _FillGraph, by_number: bool, budget: EntryBudget) -> EliminationOrder:
     variables: list[int] = []
     entries: list[int] = []
-    total = 0
+    most = math.inf
     for number in range(graph.n_variables):
         variable = number if by_number else graph.cheapest()
-        entries.append(graph.entries(variable))
-        total += entries[-1]
-        budget.check(entries[-1], total)
-        graph.eliminate(variable)
         variables.append(variable)
-    return EliminationOrder(tuple(variables), tuple(entries))
+        entries.append(graph.entries(variable))
+        if entries[-1] > budget.limit:
+            most = min(most, graph.work + MOST_WORK)
+        if graph.work + graph.degree(variable) ** 2 > most:
+            return EliminationOrder(tuple(variables), tuple(entries), is_complete=False)
+        graph.eliminate(variable)
+    return EliminationOrder(tuple(variables), tuple(entries), is_complete=True)
 
 
 class _FillGraph:
@@ -115,6 +127,8 @@ class _FillGraph:
         self._versions = [0] * len(sizes)
         self._queue: list[_Candidate] = [(0, 0.0, variable, False, 0) for variable in range(len(sizes))]
         heapq.heapify(self._queue)
+        #: pairs of neighbours looked at so far
+        self.work = 0
 
     @property
     def n_variables(self) -> int:
@@ -124,6 +138,10 @@ class _FillGraph:
     def entries(self, variable: int) -> int:
         """Return the size of the table that a variable would be summed out of."""
         return math.prod((self._sizes[variable], *(self._sizes[other] for other in self._neighbours[variable])))
+
+    def degree(self, variable: int) -> int:
+        """Return how many variables share a table with a variable."""
+        return len(self._neighbours[variable])
 
     def cheapest(self) -> int:
         """Take the variable that adds fewest edges off the queue."""
@@ -140,6 +158,7 @@ class _FillGraph:
         neighbours, version = self._neighbours[variable], self._versions[variable]
         missing, bound = 0, 2 * enough + 1
         for other in neighbours:
+            self.work += len(neighbours)
             missing += len(neighbours) - 1 - len(neighbours & self._neighbours[other])
             if missing // 2 > bound:
                 return missing // 2, 0.0, variable, False, version
@@ -149,6 +168,7 @@ class _FillGraph:
     def eliminate(self, variable: int) -> None:
         """Join the neighbours of a variable with each other and take it out."""
         neighbours = self._neighbours[variable]
+        self.work += len(neighbours) ** 2
         changed = set(neighbours)
         for other in neighbours:
             self._neighbours[other].discard(variable)
@@ -165,4 +185,9 @@ class _FillGraph:
 
 def _shown(number: int) -> str:
     """Return a whole number in digits, or as a power of two if it is very long."""
-    return str(number) if number < 10**18 else f"2**{number.bit_length() - 1}"
+    return str(number) if number < 10**18 else _power(number)
+
+
+def _power(number: int) -> str:
+    """Return a whole number above zero rounded down to a power of two."""
+    return f"2**{number.bit_length() - 1}"
