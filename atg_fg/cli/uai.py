@@ -48,15 +48,19 @@ def solve(
     if task not in TASKS:
         raise InvalidInputError(f"--task: {task!r}; expected one of: {', '.join(TASKS)}")
     options.check_json_option(json_file)
-    read = read_model(plain_files.read_text_file(model), str(model))
+    read = read_model(plain_files.read_text_file(model), str(model), _note)
     observed: dict[int, int] = {}
     if evidence is not None:
-        observed = read_evidence(plain_files.read_text_file(evidence), str(evidence))
+        observed = read_evidence(plain_files.read_text_file(evidence), str(evidence), _note)
         read.check_evidence(observed, str(evidence))
     line, answer = TASKS[task](read, observed, limit)
     options.write_json({"command": "uai solve", "model": str(model), "task": task, **answer}, json_file)
     if json_file != "-":
         say(task, line)
+
+
+def _note(note: str) -> None:
+    typer.echo(f"atg-fg: {note}", err=True)
 
 
 def _partition(model: DiscreteModel, evidence: dict[int, int], limit: int) -> _Answer:

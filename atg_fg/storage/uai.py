@@ -2,15 +2,17 @@
 
 A model file is its kind, the number of variables, their cardinalities, the number of factors, the scope of each, and
 then the table of each, the last variable of a scope the fastest. A text is split at white space, so the lines it is
-laid out in do not matter; the format has no comments. An evidence file says which state which variable is in.
+laid out in do not matter. Tools write comments, from # to the end of the line, and text after the last table. An
+evidence file says which state which variable is in.
 """
 
 from __future__ import annotations
 
 import math
 import re
-from collections.abc import Iterable, Mapping
-from typing import Final, NoReturn
+import warnings
+from collections.abc import Callable, Iterable, Mapping
+from typing import Final, NoReturn, TypeAlias
 
 import numpy as np
 
@@ -21,8 +23,16 @@ from atg_fg.inference.elimination.discrete_model import KINDS, MAX_SCOPE, Discre
 _SHOWN: Final = 40
 
 
-def read_model(text: str, place: str = "model") -> DiscreteModel:
-    """Return the model in a UAI text.
+#: Is told what of a text was not read.
+Note: TypeAlias = Callable[[str], None]
+
+
+def _warn(note: str) -> None:
+    warnings.warn(note, stacklevel=4)
+
+
+def read_model(text: str, place: str = "model", note: Note = _warn) -> DiscreteModel:
+    """Return the model in a UAI text; text after the last table is ignored, and noted.
 
     Time and memory are linear in the text: the announced size of a table is compared with its scope and with what is
     left of the text before anything is made of it.
@@ -42,7 +52,7 @@ def read_model(text: str, place: str = "model") -> DiscreteModel:
         size = math.prod(shape)
         words.whole(f"size of the table of factor {index}", size, size)
         factors.append(ModelFactor(scope, words.weights(f"table of factor {index}", size).reshape(shape)))
-    words.end("the last table")
+    words.ignore_rest("the last table", note)
     return DiscreteModel(cardinalities, tuple(factors), kind)
 
 
@@ -67,12 +77,12 @@ def write_model(model: DiscreteModel) -> str:
     return "\n".join(lines) + "\n"
 
 
-def read_evidence(text: str, place: str = "evidence") -> dict[int, int]:
+def read_evidence(text: str, place: str = "evidence", note: Note = _warn) -> dict[int, int]:
     """Return the evidence in a UAI text, as the state of each observed variable.
 
     The later form is the number of observations and then a variable and its state for each: an odd number of words.
     The form of 2008 has the number of samples before that, which must be 1 here: an even number of words. So
-    no text can be read both ways. A single 0 is no evidence, in both.
+    no text can be read both ways. A 0 at the beginning is no evidence, whatever follows; that is noted.
 
     Whether the variables and states are those of a model is for ``DiscreteModel.check_evidence`` to say.
 
@@ -80,6 +90,9 @@ def read_evidence(text: str, place: str = "evidence") -> dict[int, int]:
         InvalidInputError: Anything malformed, several samples, or a variable observed twice.
     """
     words = _Words(text, place)
+    if words.begin_with("0"):
+        words.ignore_rest("0 observations", note)
+        return {}
     if len(words) % 2 == 0:
         words.whole("number of samples", 1, 1)
     evidence: dict[int, int] = {}
@@ -105,25 +118,21 @@ class _Words:
     """The words of a text, taken one after the other; errors name the line of the word taken last."""
 
     def __init__(self, text: str, place: str) -> None:
-        self._text = text
+        self._text = re.sub("#.*", "", text)
         self._place = place
-        self._words = text.split()
+        self._words = self._text.split()
         self._taken = 0
-        # Python would read 1_000 and digits of other scripts as numbers; the format does not.
-        if "_" in text or not text.isascii():
-            bad = next((n for n, word in enumerate(self._words) if "_" in word or not word.isascii()), None)
-            if bad is not None:
-                self._taken = bad + 1
-                self.refuse("text", "whole numbers and decimal numbers")
 
     def __len__(self) -> int:
         return len(self._words)
 
     def refuse(self, what: str, expected: str) -> NoReturn:
         """Raise ``InvalidInputError`` about the word taken last."""
+        raise InvalidInputError(f"{self._place}: line {self._line()}: {what}: {self._shown()}; expected {expected}")
+
+    def _shown(self) -> str:
         word = self._words[self._taken - 1]
-        shown = repr(word if len(word) <= _SHOWN else word[:_SHOWN] + "…")
-        raise InvalidInputError(f"{self._place}: line {self._line()}: {what}: {shown}; expected {expected}")
+        return repr(word if len(word) <= _SHOWN else word[:_SHOWN] + "…")
 
     def _line(self) -> int:
         for number, word in enumerate(re.finditer(r"\S+", self._text), start=1):
@@ -148,7 +157,7 @@ class _Words:
         """Take a whole number from ``least`` to ``most``."""
         word = self._take(what)
         try:
-            value = int(word)
+            value = int(word) if _is_plain(word) else least - 1
         except ValueError:
             value = least - 1
         if value < least or (most is not None and value > most):
@@ -165,7 +174,7 @@ class _Words:
             )
         words = self._words[self._taken : self._taken + size]
         try:
-            values = np.array([float(word) for word in words])
+            values = np.array([float(word) for word in words]) if _is_plain("".join(words)) else None
         except ValueError:
             values = None
         if values is None or not (np.isfinite(values).all() and (values >= 0).all()):
@@ -174,6 +183,19 @@ class _Words:
         self._taken += size
         return values
 
+    def begin_with(self, word: str) -> bool:
+        """Take the first word if it is this one, and return whether it is."""
+        begins = self._words[:1] == [word]
+        self._taken += begins
+        return begins
+
+    def ignore_rest(self, last: str, note: Note) -> None:
+        """Tell what follows, if anything does."""
+        if self._taken < len(self._words):
+            self._taken += 1
+            n_words = len(self._words) - self._taken + 1
+            note(f"{self._place}: line {self._line()}: {n_words} words after {last} are ignored: {self._shown()}")
+
     def end(self, last: str) -> None:
         """Refuse whatever follows."""
         if self._taken < len(self._words):
@@ -181,8 +203,13 @@ class _Words:
             self.refuse(f"after {last}", "the end of the text")
 
 
+def _is_plain(word: str) -> bool:
+    """Whether Python reads a word as others do: it takes 1_000 and digits of other scripts for numbers, too."""
+    return word.isascii() and "_" not in word
+
+
 def _is_weight(word: str) -> bool:
     try:
-        return 0 <= float(word) < math.inf
+        return _is_plain(word) and 0 <= float(word) < math.inf
     except ValueError:
         return False

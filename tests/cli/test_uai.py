@@ -70,8 +70,14 @@ def test_what_cannot_be_solved_is_one_line(refused, model, tmp_path):
     ):
         evidence.write_text(text)
         assert says in refused("uai", "solve", model, "--task", "MAR", "--evidence", evidence)
-    model.write_text(MODEL + " 7")
-    assert "model.uai: line 1: after the last table: '7'" in refused("uai", "solve", model, "--task", "PR")
+
+
+def test_text_after_the_last_table_is_noted_beside_the_answer(run, model):
+    plain = run("uai", "solve", model, "--task", "PR")
+    model.write_text(MODEL + " # a comment\n 7")
+    status, output, error = run("uai", "solve", model, "--task", "PR")
+    assert (status, output) == plain[:2]
+    assert error.endswith("model.uai: line 2: 1 words after the last table are ignored: '7'\n")
 
 
 STEPS = [

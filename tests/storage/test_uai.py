@@ -89,7 +89,7 @@ def test_what_is_written_is_read_again_to_the_last_bit(model):
     [
         ("MARKOV", "MARKOFF", "line 1: kind of model: 'MARKOFF'; expected MARKOV or BAYES"),
         ("MARKOV", "markov", "line 1: kind of model: 'markov'"),
-        ("MARKOV", "# a comment\nMARKOV", "line 1: kind of model: '#'"),
+        ("MARKOV", "# a comment\nMARKOFF", "line 2: kind of model: 'MARKOFF'"),
         ("2 3 2\n", "2 0 2\n", "line 3: cardinality of variable 1: '0'; expected a whole number of at least 1"),
         ("2 3 2\n", "2 3.0 2\n", "line 3: cardinality of variable 1: '3.0'"),
         ("2 0 1", "2 0 3", "line 5: variable in the scope of factor 0: '3'; expected a whole number from 0 to 2"),
@@ -103,10 +103,10 @@ def test_what_is_written_is_read_again_to_the_last_bit(model):
         ("5 6.5", "5 inf", "line 10: table of factor 0: 'inf'"),
         ("5 6.5", "5 1e999", "line 10: table of factor 0: '1e999'"),
         ("5 6.5", "five 6.5", "line 10: table of factor 0: 'five'"),
-        ("5 6.5", "5 6_5", "line 10: text: '6_5'"),
-        ("5 6.5", "5 ٣", "line 10: text: '٣'"),
+        ("5 6.5", "5 6_5", "line 10: table of factor 0: '6_5'"),
+        ("5 6.5", "5 ٣", "line 10: table of factor 0: '٣'"),
         ("1e2\n", "", "the text ends in the table of factor 1, after 1 of its values; expected 2"),
-        ("1e2\n", "1e2 7\n", "line 12: after the last table: '7'; expected the end of the text"),
+        ("2 3 2\n", "2 3 1_0\n", "line 3: cardinality of variable 2: '1_0'"),
         (TEXT, "", "the text ends after 0 words; expected the kind of model, MARKOV or BAYES"),
         (TEXT, "MARKOV 1000000000000 2", "the text ends after 3 words; expected the cardinality of variable 1"),
         (TEXT, "MARKOV 1 2 1000000000000 0", "the text ends after 5 words; expected the size of the scope of factor 1"),
@@ -177,6 +177,7 @@ def test_the_tables_of_a_model_are_its_own_and_cannot_be_written_to():
         ("1 1 4 2", {4: 2}),
         ("2\n0 1\n5 0\n", {0: 1, 5: 0}),
         ("1\n2 0 1 5 0\n", {0: 1, 5: 0}),
+        ("# what was seen\n1 # one look\n0 1 # x0", {0: 1}),
     ],
 )
 def test_evidence_is_read_with_and_without_the_number_of_samples(text, evidence):
@@ -201,7 +202,6 @@ def test_evidence_is_read_again_as_it_was_written(evidence):
         ("1 0 -1", "state of observation 0: '-1'; expected a whole number of at least 0"),
         ("1 x 1", "variable of observation 0: 'x'"),
         ("1\n0 1\n7 7", "line 3: after the last observation: '7'; expected the end of the text"),
-        ("1 0 1 # seen", "line 1: after the last observation: '#'; expected the end of the text"),
     ],
 )
 def test_what_is_wrong_with_evidence_is_said_with_its_place(text, says):
@@ -226,6 +226,34 @@ def test_no_text_of_evidence_can_be_read_both_ways():
 
 def read_or_none(text):
     try:
-        return read_evidence(text)
+        return read_evidence(text, note=lambda _: None)
     except InvalidInputError:
         return None
+
+
+def test_comments_are_passed_over_and_lines_are_counted_with_them():
+    commented = TEXT.replace("3\n2 3 2", "3 # variables\n# each has\n2 3 2 # states").replace(
+        "6\n", "6 # 2 · 3, naïve_ly\n"
+    )
+    assert write_model(read_model(commented)) == write_model(read_model(TEXT))
+    with pytest.raises(InvalidInputError, match="line 11: table of factor 0: 'six'"):
+        read_model(commented.replace("6.5", "six"))
+
+
+@pytest.mark.parametrize("rest", ["some text that a tool left here", "7", "naïve under_scores", "MARKOV 1 2 0"])
+def test_text_after_the_last_table_is_ignored_and_noted(rest):
+    notes = []
+    assert write_model(read_model(f"{TEXT}\n{rest}\n", "graph.uai", notes.append)) == write_model(read_model(TEXT))
+    first, n_words = rest.split()[0], len(rest.split())
+    assert notes == [f"graph.uai: line 14: {n_words} words after the last table are ignored: {first!r}"]
+    with pytest.warns(UserWarning, match="after the last table are ignored"):
+        read_model(f"{TEXT} {rest}")
+
+
+@pytest.mark.parametrize("text", ["0\n1 0\n", "0 0", "0\nno evidence at all", "0 1 2 3"])
+def test_evidence_that_begins_with_0_is_none_whatever_follows(text):
+    notes = []
+    assert read_evidence(text, "seen.evid", notes.append) == {}
+    (note,) = notes
+    assert note.startswith("seen.evid: line ")
+    assert "after 0 observations are ignored" in note

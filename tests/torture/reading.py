@@ -181,13 +181,13 @@ def _replay(path: Path) -> None:
 
 
 def _solve(path: Path) -> None:
-    model = read_model(plain_files.read_text_file(path), str(path))
+    model = read_model(plain_files.read_text_file(path), str(path), note=lambda _: None)
     log_partition(model, limit=_LIMIT)
     marginals(model, limit=_LIMIT)
 
 
 def _use_evidence(path: Path) -> None:
-    evidence = read_evidence(plain_files.read_text_file(path), str(path))
+    evidence = read_evidence(plain_files.read_text_file(path), str(path), note=lambda _: None)
     original = read_model(originals()["UAI model"][-1].decode())
     original.check_evidence(evidence)
 
