@@ -35,7 +35,6 @@ world = atg.make_world("robonaut", cubes=cubes, condition="nominal", render_mode
 
 # %%
 # After the world, which imports the simulator without its banner.
-from sim.bodies.robot import HOME_POSTURE
 from sim.manipulation.waypoints import GRIP_FORCE
 from sim.noise_calibration import Counts, calibrate
 from sim.reliability import run_actions, summarise
@@ -130,7 +129,7 @@ print(f"off by {outcome['angle_error']:.2f}° and {1000 * outcome['position_erro
 # %%
 JOINTS = "shoulder roll", "shoulder pitch", "upper-arm roll", "elbow", "forearm roll", "wrist pitch", "wrist yaw"
 exertion, body = robot.controller.exertion, robot.scene.robot
-gravity = np.abs(body.gravity_torques(HOME_POSTURE)) / body.effort
+gravity = np.abs(body.gravity_torques(body.model.home)) / body.effort
 rows = np.arange(len(JOINTS))
 
 # %%

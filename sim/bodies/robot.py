@@ -135,10 +135,11 @@ class RobotBody:
         """Where the robot's frame is in the world, as the rail measures it, shape [3], m."""
         return np.array([0.0, 0.0 if self.rail is None else self.rail.position, 0.0])
 
-    def contact_force(self, side: int, body: int) -> float:
-        """Return the normal force between a hand (0 left, 1 right) and another body, N."""
+    def contact_forces(self, body: int) -> tuple[float, float]:
+        """Return the normal forces between the hands, left and right, and another body, N."""
         points = pybullet.getContactPoints(self.body, body, physicsClientId=self.client)
-        return float(sum(point[9] for point in points if point[3] == self.hands[side]))
+        left, right = (sum(point[9] for point in points if point[3] == hand) for hand in self.hands)
+        return float(left), float(right)
 
     def touches_itself(self) -> bool:
         """Whether an arm touches the torso, the head or the other arm."""

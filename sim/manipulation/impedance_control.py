@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from array import array
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Final
@@ -156,8 +157,7 @@ class ArmController:
         robot, advance = self.robot, self._advance
         most = robot.effort.ravel()
         least = float(most.min())
-        velocities: list[list[float]] = []
-        torques: list[list[float]] = []
+        velocities, torques = array("d"), array("d")
         for step in range(steps):
             if step % _STEPS_PER_REFERENCE == 0 and step // _STEPS_PER_REFERENCE < len(rows):
                 command = rows[step // _STEPS_PER_REFERENCE]
@@ -169,10 +169,10 @@ class ArmController:
             weak = max(wanted) > least or min(wanted) < -least
             robot.drive(np.clip(wanted, -most, most).tolist() if weak else wanted)
             advance()
-            velocities.append([state[1] for state in states])
-            torques.append(wanted)
+            velocities.extend([state[1] for state in states])
+            torques.extend(wanted)
         if steps:
-            self.exertion.add(np.abs(velocities), np.abs(torques), robot)
+            self.exertion.add(np.abs(velocities).reshape(steps, -1), np.abs(torques).reshape(steps, -1), robot)
 
 
 def _cubic(way: FloatArray, first: FloatArray, last: FloatArray) -> tuple[FloatArray, FloatArray]:

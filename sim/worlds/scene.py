@@ -129,8 +129,7 @@ class Scene:
         pybullet.stepSimulation(physicsClientId=self.client)
         self.steps += 1
         if self.steps % _STEPS_PER_SAMPLE == 0:
-            forces = (self.robot.contact_force(hand, self.cube.body) for hand in range(2))
-            self.peak_force = max(self.peak_force, *forces)
+            self.peak_force = max(self.peak_force, *self.robot.contact_forces(self.cube.body))
             self.self_contacts += self.robot.touches_itself()
         if self.on_step is not None:
             self.on_step()

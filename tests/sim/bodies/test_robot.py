@@ -176,7 +176,7 @@ def test_the_force_of_a_contact_is_told_for_the_hand_that_touches(robot, side):
     box = pybullet.createMultiBody(0, shape, basePosition=place.tolist(), physicsClientId=robot.client)
     # The arms fall: one hand lands on the box.
     pybullet.stepSimulation(physicsClientId=robot.client)
-    forces = [robot.contact_force(hand, box) for hand in range(2)]
+    forces = robot.contact_forces(box)
     assert forces[side] > 0
     assert forces[1 - side] == 0
 
