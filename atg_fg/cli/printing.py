@@ -25,7 +25,9 @@ Paper = Annotated[str, typer.Option(help="Paper: a4, a3 or letter.")]
 @app.command()
 def cube(
     tags: Annotated[str, typer.Option(help="Ids of the tags that may be on the cubes, such as 0-11.")] = "0-11",
-    cubes: Annotated[int, typer.Option(min=1, help="Number of cubes, told apart in as few actions as can be.")] = 1,
+    cubes: Annotated[
+        int, typer.Option(min=1, max=100, help="Number of cubes, told apart in as few actions as can be.")
+    ] = 1,
     dictionary: Annotated[str, typer.Option(help="Dictionary of the tags.")] = "5X5_50",
     side: Annotated[float, typer.Option(help="Side of a cube, mm.")] = 56.0,
     tag_size: Annotated[float | None, typer.Option(help="Side of a tag, mm; three quarters of the cube's.")] = None,
