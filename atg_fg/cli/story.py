@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 from rich.console import Console
 
 from atg_fg.core.belief import IdentityBelief
@@ -57,6 +59,12 @@ class Story:
             probability = 0.0 if best is None else float(belief.objects[best])
             text = f"verdict: {record.matched} (probability {probability:.1%})"
         self.console.print(text, style="bold green")
+
+    def mistakes(self, wrong: Sequence[tuple[int, int, float]]) -> None:
+        """Print which labels were probably wrong: look, slot and probability of each."""
+        slots = self.assumptions.alphabet.slots
+        for look, slot, probability in wrong:
+            self.console.print(f"look {look}, {slots[slot]}, was probably a mistake: {probability:.0%}")
 
     def _top(self, belief: IdentityBelief) -> list[tuple[str, float]]:
         """Return the three most probable remembered objects, and *unseen*."""

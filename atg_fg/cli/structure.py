@@ -20,6 +20,7 @@ from atg_fg.display.structure_picture import draw_structure
 from atg_fg.display.structure_words import action_text, register_names
 from atg_fg.learning.completion import CompletedGraph, completed_atg, statuses
 from atg_fg.learning.learner import BelievedStructure
+from atg_fg.learning.predictive_checks import summary_of_evidence
 from atg_fg.learning.structured_memory import StructuredMemory
 from atg_fg.storage import memory_files
 
@@ -71,12 +72,31 @@ def _tell_none(file: Path, memory: StructuredMemory | None, plot: Path | None, j
         reason = "its trials were not kept; trials with --preset learned are"
     else:
         reason = f"none explains its {len(memory.learner.trials)} trials better than plain ATGs do"
+        if memory.erring:
+            reason = "looks err, see below"
     if plot is not None:
         raise InvalidInputError(f"--plot: {file} has no learned structure to draw: {reason}")
     trials = 0 if memory is None else len(memory.learner.trials)
-    options.write_json({"command": "structure show", "trials": trials, "structures": [], "objects": []}, json_file)
+    erring = {} if memory is None else summary_of_evidence(memory)
+    document = {"command": "structure show", "trials": trials, "structures": [], "objects": []}
+    options.write_json({**document, **({"erring": erring} if erring else {})}, json_file)
     if json_file != "-":
         say(f"{file}: no learned structure: {reason}")
+        _tell_erring(erring)
+
+
+def _tell_erring(erring: dict[str, Any]) -> None:
+    """Say what the model of looks that err has found."""
+    if not erring or erring["weight"] < 0.5:
+        return
+    own = f", {erring['own_automata']} of them moved otherwise than the others" if erring["own_automata"] else ""
+    say(
+        f"looks err: {100 * erring['wrong']:.1f} % of labels wrong, {100 * erring['slip']:.1f} % of actions fail; "
+        f"{erring['states']} states, {erring['registers']} registers; {erring['objects']} objects{own}; "
+        f"{erring['reassignments']} raw trials changed hands"
+    )
+    for warning in erring["warnings"]:
+        say(f"warning: {warning}")
 
 
 def _document(

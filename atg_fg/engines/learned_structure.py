@@ -125,6 +125,31 @@ class LearnedStructure(BayesFilter):
             sampled[memory.names.index(name)] += probability
         return IdentityBelief.of(np.maximum(total, 0.0) + erring * sampled, self.model.n_unseen)
 
+    def mistakes(self, least: float = 0.5) -> list[tuple[int, int, float]]:
+        """Return the look, the slot and the probability of each label that is probably wrong, given the whole trial.
+
+        Only of the model in which looks err, for the object that is most probable under it; empty without.
+
+        Args:
+            least: Labels that are wrong with less probability are left out.
+        """
+        beliefs, looks = self._type_beliefs()[1:], self.history.evidence
+        wrong: dict[tuple[int, int], float] = {}
+        total = sum(
+            (b for b, each in zip(beliefs, self._followed, strict=True) if isinstance(each, FollowedChain)),
+            np.zeros(self.model.n_hypotheses),
+        )
+        hypothesis, weight = int(total.argmax()), float(total.max())
+        for belief, each in zip(beliefs, self._followed, strict=True):
+            if not isinstance(each, FollowedChain) or not belief[hypothesis] > 0:
+                continue
+            share = float(belief[hypothesis]) / weight
+            for look, slots in enumerate(each.filter.right_labels(hypothesis, list(looks))):
+                for slot, right in enumerate(slots):
+                    if right is not None:
+                        wrong[look, slot] = wrong.get((look, slot), 0.0) + share * (1.0 - right)
+        return [(*place, probability) for place, probability in wrong.items() if probability >= least]
+
     def _log_joints(self) -> list[FloatArray]:
         """Return ln p(O, type, z_0:t | a_1:t) of being plain, then of following each structure, each of shape [H]."""
         plain = self._log_plain + self._belief.log_identity + self._log_evidence

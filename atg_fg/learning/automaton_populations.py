@@ -99,13 +99,7 @@ class AutomatonPopulation(Population):
     def log_evidence(self, task: Task) -> float:
         """Return ln p(all trials, each of a fresh object) + ln p(automaton) of the best chain."""
         best = max(self.chains, key=lambda chain: chain.score)
-        fresh = kernels.fresh_log_evidence(
-            best.trials(task),
-            best.clusters.successors[0],
-            best.clusters.registers,
-            len(best.clusters.tables[0]),
-            best.clusters.prior,
-        )
+        fresh = best.fresh_log_evidence(task)
         return float(fresh.sum()) - self._n_actions * self._n_states * float(np.log(self._n_states))
 
     def saved(self, recording: Recording) -> list[SavedChain]:

@@ -19,6 +19,8 @@ from atg_fg.learning.shared_structure import SharedStructure
 
 #: Beta prior of a slip.
 SLIP_PRIOR: Final = (1.0, 99.0)
+#: Probability that two wrong labels of a register are the same if the structure is not the right one.
+RECURRING: Final = 0.4
 #: With more trials than this, only those that the new one touches are moved, and some others.
 ALL_TRIALS: Final = 200
 OTHER_TRIALS: Final = 50
@@ -259,6 +261,28 @@ class Chain:
             looks = np.zeros((len(result), n_names))
             np.add.at(looks, (self.clusters.owner[named], names[named]), task.recording.lengths[named])
             result = np.where(looks.any(axis=1), looks.argmax(axis=1), -1)
+        return result
+
+    def log_odds_of_mistakes(self, task: Task) -> float:
+        """Return ln of the Bayes factor that what is taken for wrong labels is a mistake of the structure instead.
+
+        Accidents of one register seldom show the same wrong label twice in a trial, with probability 1 / (V − 1); where
+        the structure is not the right one, the same label comes again whenever the object is turned the same way.
+        """
+        self._learn_again(task)
+        pairs, same = kernels.recurrences(self.trials(task), self.clusters, task.recording.labels)
+        by_accident = 1.0 / max(task.recording.n_symbols - 1, 2)
+        again, other = np.log(RECURRING / by_accident), np.log((1.0 - RECURRING) / (1.0 - by_accident))
+        return float(same * again + (pairs - same) * other)
+
+    def fresh_log_evidence(self, task: Task) -> FloatArray:
+        """Return ln p(trial | a fresh object that shares), up to the scale of its looks, shape [N]."""
+        clusters, recording = self.clusters, task.recording
+        trials = TrialArrays(task.looks, recording.actions, recording.lengths)
+        n_registers = clusters.tables.shape[1]
+        result: FloatArray = kernels.fresh_log_evidence(
+            trials, clusters.successors[0], clusters.registers, n_registers, clusters.prior
+        )
         return result
 
     def tally(self, task: Task, weight: float, right: FloatArray, truth: FloatArray) -> None:

@@ -191,6 +191,26 @@ class EvidenceLearner:
         owners: list[int] = state.population.chains[int(state.weights.argmax())].clusters.owner.tolist()
         return owners
 
+    def best(self) -> Chain | None:
+        """Return the chain of most weight, ``None`` if nothing was sampled."""
+        state = self._current
+        return None if state.population is None else state.population.chains[int(state.weights.argmax())]
+
+    @property
+    def is_mistaken(self) -> bool:
+        """Whether what the best chain takes for wrong labels recurs, as a structure's mistakes do and accidents do not."""
+        state, best = self._current, self.best()
+        if best is None:
+            return False
+        return best.log_odds_of_mistakes(self._task(self.learner.trials, state.noise)) > 0
+
+    def log_gain_over_chance(self) -> FloatArray:
+        """Return ln p(trial | a fresh object, the best chain) / p(labels drawn uniformly) of each trial, shape [N]."""
+        state, best = self._current, self.best()
+        if best is None:
+            return np.zeros(0)
+        return best.fresh_log_evidence(self._task(self.learner.trials, state.noise))
+
     @property
     def _current(self) -> _State:
         """What is learned from all trials; those that came in a file without it are sampled all at once."""

@@ -256,3 +256,29 @@ def right_probabilities(
                     right[trial, time, slot] += weight * clusters.tables[cluster, register, label]
                     for symbol in range(len(truth)):
                         truth[symbol, label] += weight * clusters.tables[cluster, register, symbol]
+
+
+@compiled
+def recurrences(trials: TrialArrays, clusters: Clusters, labels: IntArray) -> tuple[int, int]:
+    """Return how many pairs of wrong labels of one register there are within trials, and how many are of one label.
+
+    A label is taken for wrong if it is not the most probable symbol of its register.
+    """
+    path = np.empty(trials.looks.shape[1], np.int64)
+    counts = np.zeros(clusters.tables.shape[1:], np.int64)
+    n_pairs, n_same = 0, 0
+    for trial in range(len(trials.lengths)):
+        cluster = clusters.owner[trial]
+        if cluster < 0:
+            continue
+        successors = clusters.successors[clusters.automaton[cluster]]
+        walk(successors, trials.actions[trial], trials.lengths[trial], clusters.start[trial], path)
+        counts[:] = 0
+        for time in range(trials.lengths[trial]):
+            for slot in range(labels.shape[2]):
+                register, label = clusters.registers[path[time], slot], labels[trial, time, slot]
+                if label >= 0 and label != np.argmax(clusters.tables[cluster, register]):
+                    n_pairs += counts[register].sum()
+                    n_same += counts[register, label]
+                    counts[register, label] += 1
+    return n_pairs, n_same

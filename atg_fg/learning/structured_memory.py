@@ -27,6 +27,10 @@ OUTDONE: Final = 20.0
 FIRST_TRIALS: Final = 8
 
 
+#: Gain of a model whose structure is mistaken.
+MISTAKEN: Final = -2 * OUTDONE
+
+
 class Reassignment(NamedTuple):
     """A raw trial that was given to another ATG.
 
@@ -223,7 +227,11 @@ class StructuredMemory(RobotMemory):
     def _evident_gain(self) -> float:
         if not self.assumptions.alphabet.exclusive:
             return np.inf
-        return self.evidence.log_evidence - self.learner.log_evidence if self.learner.trials else 0.0
+        if not self.learner.trials:
+            return 0.0
+        gain = self.evidence.log_evidence - self.learner.log_evidence
+        # However much it explains, it is not believed if its errors are the structure's and not the detector's.
+        return min(gain, MISTAKEN) if self.evidence.is_mistaken else gain
 
     def _merge_shared(self, keep: str, drop: str) -> tuple[int, ...]:
         trials = tuple(number for number, owner in enumerate(self.learner.owners) if owner == drop)

@@ -310,3 +310,27 @@ def test_objects_that_share_nothing_get_automata_of_their_own():
     assert owner[0] != owner[1]
     # One may keep the shared automaton for itself; the other has its own.
     assert len(chain.own_automata) >= 1
+
+
+def test_errors_that_recur_are_the_structures_and_those_that_do_not_are_the_detectors():
+    rng = np.random.default_rng(15)
+    odds = []
+    for contents in ([0, 1, 2], [0, 1, 2]), ([0, 1, 2], [3, 4, 5]):
+        # In the second case the third side shows something else each time that the first action has been tried.
+        labels = np.zeros((10, 12, 1), dtype=np.int64)
+        actions = rng.integers(2, size=(10, 12))
+        for trial in range(10):
+            state, mode = rng.integers(3), 0
+            for time in range(12):
+                is_wrong = rng.random() < 0.2 and contents[0] == contents[1]
+                labels[trial, time, 0] = rng.integers(6) if is_wrong else contents[mode][state]
+                state, mode = RING.successors[actions[trial, time], state], int(rng.random() < 0.3)
+        recording = Recording(labels, np.full(labels.shape, np.nan), actions, np.full(10, 12), 6)
+        task = Task.of(recording, DetectorNoise.unknown(6), 1)
+        chain = Chain(RING, 0.0, 6)
+        chain.admit(task)
+        chain.scatter(rng)
+        for _ in range(10):
+            chain.sweep(task, rng)
+        odds.append(chain.log_odds_of_mistakes(task))
+    assert odds[0] < 0 < odds[1]
