@@ -198,7 +198,7 @@ class EvidenceLearner:
 
     @property
     def is_mistaken(self) -> bool:
-        """Whether what the best chain takes for wrong labels recurs, as a structure's mistakes do and accidents do not."""
+        """Whether what the best chain takes for wrong labels recurs, as a structure's mistakes do."""
         state, best = self._current, self.best()
         if best is None:
             return False
