@@ -49,6 +49,8 @@ def reliability(
     parameters = {"condition": condition, "actions": actions, "seed": seed}
     if stations > 1:
         parameters["stations"] = stations
+    if urdf is not None:
+        parameters["urdf"] = str(urdf)
     options.write_json({"command": "sim reliability", "parameters": parameters, **summary}, json_file)
     if json_file != "-":
         options.console().print(_reliability_table(f"{condition}: {actions} random actions, seed {seed}", summary))
