@@ -220,9 +220,12 @@ class StructuredMemory(RobotMemory):
     @property
     def gain(self) -> float:
         """How many nats the model in which looks err is ahead; ∞ where there is no other."""
-        if self._gain is None:
-            self._gain = self._evident_gain()
-        return self._gain
+        if self._gain is not None:
+            return self._gain
+        if not self.assumptions.alphabet.exclusive:
+            return np.inf
+        # Trials that came in a file without what was sampled are not sampled before there is another one.
+        return MISTAKEN if self.learner.trials else 0.0
 
     def _evident_gain(self) -> float:
         if not self.assumptions.alphabet.exclusive:
