@@ -7,7 +7,7 @@ from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence
-from atg_fg.core.records import TrialRecord, TrialStep, TrialSummary
+from atg_fg.core.records import TrialRecord, TrialStep, TrialSummary, confidences_in
 from atg_fg.engines import begin_trial
 from atg_fg.experiments.scores import Score, TestResult
 from atg_fg.experiments.trial import learn_from
@@ -36,6 +36,7 @@ def rescore(test: RecordedTest, engine: str, parameters: ModelParameters) -> Tes
     for recorded in test.trials:
         trial = TrialSummary.of(_judged(recorded, memory, test.assumptions, engine, parameters))
         score.add(trial, learn_from(trial, memory))
+        score.mend(memory)
     return score.result(0)
 
 
@@ -46,10 +47,11 @@ def _judged(
     inference = begin_trial(engine, memory, parameters)
     record = TrialRecord(memory.names, assumptions, lost_truth=trial.lost_truth)
     for look in trial.steps:
-        evidence = Evidence.of_detection(assumptions.alphabet, look.observed)
+        evidence = Evidence.of_detection(assumptions.alphabet, look.observed, confidences_in(look.truth))
         inference.observe(evidence)
         action = None if look.action is None else assumptions.action_index(look.action)
-        belief, evidenced = inference.identity(), inference.log_evidence
+        belief = inference.conclude() if action is None else inference.identity()
+        evidenced = inference.log_evidence
         record.steps.append(TrialStep(look.observed, evidence.pattern, belief, evidenced, look.truth, None, action))
         if action is not None:
             inference.act(action)
