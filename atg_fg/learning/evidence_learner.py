@@ -18,6 +18,8 @@ from atg_fg.learning.learner import StructureLearner
 from atg_fg.learning.raw_trials import RawTrial, Recording
 from atg_fg.learning.saved_chain import SavedChain
 
+#: A structure that takes more labels than this for wrong explains nothing.
+MOST_WRONG: Final = 0.3
 #: Chains of less weight are not followed through a trial.
 LEAST_WEIGHT: Final = 1e-3
 
@@ -198,10 +200,12 @@ class EvidenceLearner:
 
     @property
     def is_mistaken(self) -> bool:
-        """Whether what the best chain takes for wrong labels recurs, as a structure's mistakes do."""
+        """Whether what the best chain takes for wrong labels recurs, as a structure's mistakes do, or is too much."""
         state, best = self._current, self.best()
         if best is None:
             return False
+        if state.noise.wrong > MOST_WRONG:
+            return True
         return best.log_odds_of_mistakes(self._task(self.learner.trials, state.noise)) > 0
 
     def log_gain_over_chance(self) -> FloatArray:
