@@ -217,7 +217,10 @@ def _damaged_words(rng: random.Random, content: bytes) -> bytes:
 
 def _damaged_document(rng: random.Random, content: bytes) -> bytes:
     """Return a JSON document with some of its values replaced, repeated, moved or left out, or made large."""
-    document = json.loads(content)
+    try:
+        document = json.loads(content)
+    except ValueError:  # damaged before
+        return _damaged_bytes(rng, content)
     if isinstance(document, dict) and "assumptions" in document and "memory" in document and rng.random() < 0.25:
         _enlarge(rng, document)
         if rng.random() < 0.7:
