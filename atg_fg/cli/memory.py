@@ -150,7 +150,7 @@ def repair(
     options.write_json({"command": "memory repair", "faults": faults}, json_file)
     if json_file != "-":
         for line in faults or [f"{file}: no record in it is bad"]:
-            typer.echo(line)
+            say(line)
 
 
 def _holds_memory(file: Path) -> bool:

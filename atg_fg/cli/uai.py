@@ -60,7 +60,7 @@ def solve(
 
 
 def _note(note: str) -> None:
-    typer.echo(f"atg-fg: {note}", err=True)
+    say(f"atg-fg: {note}", err=True)
 
 
 def _partition(model: DiscreteModel, evidence: dict[int, int], limit: int) -> _Answer:
