@@ -23,9 +23,9 @@ class PlainConsole(Console):
         return super().render_str(visible(text, keep="\n"), **options)
 
 
-def say(*lines: str) -> None:
-    """Print lines; none of them can become two."""
-    typer.echo("\n".join(map(visible, lines)))
+def say(*lines: str, err: bool = False) -> None:
+    """Print lines, on standard error if ``err``; none of them can become two."""
+    typer.echo("\n".join(map(visible, lines)), err=err)
 
 
 def say_document(text: str) -> None:
