@@ -52,7 +52,7 @@ def test_a_recording_of_the_robot_holds_robot_cube_camera_belief_and_entropy(run
         assert entity in rows, entity
     assert any(name.startswith("/world/table_0/") and name.endswith("/shape_0") for name in rows)
     links = {name.split("/")[3] for name in rows if name.startswith("/world/robot/")}
-    assert {"r2.left_arm.wrist.yaw_link", "r2.right_arm.wrist.yaw_link"} <= links
+    assert {"r2.left_arm.wrist.yaw", "r2.right_arm.wrist.yaw"} <= links
     assert sum("/world/robot/" in name and "/shape_" in name for name in rows) == 68
     # The action takes some simulated seconds, in which poses are logged ten times a second.
     assert rows["/world/cube_0"] > 20

@@ -126,9 +126,10 @@ def _run_on(
             running[workers.submit(function, pieces[number])] = number
         patience = None if on_steps is None else _SECONDS
         ended = wait(running, patience, return_when=FIRST_COMPLETED).done
-        if on_steps is not None and workers.steps() > told:
-            on_steps(workers.steps() - told)
-            told = workers.steps()
+        done = workers.steps()  # asked once: pieces go on while they are told of
+        if on_steps is not None and done > told:
+            on_steps(done - told)
+            told = done
         for future in ended:
             number = running.pop(future)
             try:
