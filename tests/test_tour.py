@@ -22,8 +22,8 @@ SHORTER = {
 }
 #: Packages of optional extras that a command cannot do without.
 NEEDS = {"report": "jinja2", "watch": "rerun", "demo": "pybullet", "sim": "pybullet", "figure3": "matplotlib"}
-#: They print times, or what is installed.
-CHANGING = {"doctor", "engines compare"}
+#: They print times, of which tables are as wide as they are long, or what is installed.
+CHANGING = {"doctor", "engines compare", "sim reliability"}
 
 
 @pytest.fixture(scope="module")
