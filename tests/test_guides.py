@@ -139,6 +139,7 @@ def webcam_guide(tmp_path):
     return run_commands
 
 
+@pytest.mark.slow
 def test_the_guide_to_webcams_runs_as_it_is_printed_with_shorter_films(webcam_guide, monkeypatch, capsys):
     def shortened(words):
         return [*words, "--trials", "1", "--actions", "1"] if words[1] == "sim" else words

@@ -10,7 +10,7 @@ import pytest
 FOLDER = Path(__file__).parents[1] / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
 #: Those that run for half a minute.
-LONG = ("03", "07", "08", "09")
+LONG = ("03", "06", "07", "08", "09")
 
 
 @pytest.fixture(scope="module")

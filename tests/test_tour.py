@@ -71,6 +71,7 @@ def test_the_robot_recognises_an_object_within_the_first_three_commands(tour):
     assert any(line.startswith("verdict: object-") for each in tour.commands()[:3] for line in each.output)
 
 
+@pytest.mark.slow
 def test_every_command_of_the_tour_runs_and_prints_what_the_page_says(tour, tmp_path):
     assert check(tour, tmp_path, SHORTER) >= 12
     made = {path.name for path in tmp_path.iterdir()}

@@ -108,7 +108,14 @@ def test_every_command_shows_names_in_a_script_as_they_are(shown, tmp_path, name
     shown("uai", "export", file, "--model", tmp_path / "model", "--evidence", tmp_path / "evidence")
 
 
-@pytest.mark.parametrize("name", ["[/b]:smile:$\\frac{1}{", "\x1b[31mred\x9b2J\u202elive\x00", 'two\nlines<b>"&|'])
+@pytest.mark.parametrize(
+    "name",
+    [
+        pytest.param("[/b]:smile:$\\frac{1}{", marks=pytest.mark.slow),
+        "\x1b[31mred\x9b2J\u202elive\x00",
+        pytest.param('two\nlines<b>"&|', marks=pytest.mark.slow),
+    ],
+)
 def test_structures_are_told_and_drawn_with_any_names(shown, tmp_path, name):
     file = tmp_path / "memory.json"
     memory = box_memory()

@@ -73,6 +73,7 @@ def test_the_same_seed_chooses_the_same_cubes():
     assert make_distinct_arcubes(4, range(12), 3) == make_distinct_arcubes(4, range(12), 3)
 
 
+@pytest.mark.slow
 def test_six_tags_make_thirty_cubes_and_no_more():
     cubes = make_distinct_arcubes(30, np.arange(6).tolist())
     assert len({canonical(cube) for cube in cubes}) == 30

@@ -148,6 +148,7 @@ class TestCluster:
         with pytest.raises(MissingDependencyError, match=r"dask is not installed.*atg-fg\[cluster\]"):
             run_pieces(pieces.square, [1], "dask://127.0.0.1:1")
 
+    @pytest.mark.slow
     def test_a_scheduler_that_dies_is_one_clear_error(self, tmp_path, capfd):
         pytest.importorskip("distributed")
         with dask_cluster.scheduler(tmp_path) as (process, address), dask_cluster.workers(address, tmp_path, 1):
