@@ -30,7 +30,6 @@ from atg_fg.storage.trial_log import to_line
 
 GRAPH_FORMATS: Final = {"graphml": view_to_graphml, "dot": view_to_dot}
 EXPORTS: Final = (*GRAPH_FORMATS, "json", "trials")
-_GZIP: Final = b"\x1f\x8b"
 
 
 def export(
@@ -113,7 +112,7 @@ def import_files(
 
 
 def _import(files: list[Path], into: Path) -> None:
-    logs = [file for file in files if _is_log(file)]
+    logs = [file for file in files if plain_files.starts_with(file, plain_files.GZIP)]
     records: list[list[tuple[Experiment | None, list[TrialSummary]]]] = [[records_in_log(file)] for file in logs]
     records += [list(records_in(file)) for file in files if is_database(file)]
     memories = [load_memory(file) for file in files if file not in logs and _has_memory(file)]
@@ -128,14 +127,6 @@ def _import(files: list[Path], into: Path) -> None:
     n_objects = sum(map(len, full))
     n_experiments, n_trials = (sum(counts[kind] for counts in added) for kind in (0, 1))
     say(f"{into}: {n_objects} ATGs, {n_experiments} experiments and {n_trials} trials imported")
-
-
-def _is_log(file: Path) -> bool:
-    try:
-        with file.open("rb") as opened:
-            return opened.read(len(_GZIP)) == _GZIP
-    except OSError as error:
-        raise InvalidInputError(f"{file}: cannot be read: {error.strerror}") from error
 
 
 def _has_memory(file: Path) -> bool:

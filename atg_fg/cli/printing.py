@@ -61,7 +61,7 @@ def cube(
     content = _content(output, chosen, dictionary, side, size, paper)
     known = CubeTags(dictionary, size / 1000, ids, chosen)
     beside = output.with_suffix(".json")
-    plain_files.check_writable(beside)
+    _check_replaceable(beside)
     plain_files.write_bytes_atomically(output, content)
     options.write_json(write_tags(known), str(beside))
     needed = expected_actions(chosen)
@@ -96,6 +96,20 @@ def board(
     made = CalibrationBoard(columns, rows, square / 1000, tag / 1000, dictionary)
     plain_files.write_bytes_atomically(output, board_sheet(made, paper))
     say(f"saved: {output}")
+
+
+def _check_replaceable(beside: Path) -> None:
+    """Raise ``InvalidInputError`` unless the tags of cubes can be written here, over nothing but tags of cubes."""
+    from atg_fg.storage.camera_files import read_tags
+
+    plain_files.check_writable(beside)
+    if plain_files.is_plain_file(beside):
+        try:
+            read_tags(beside)
+        except InvalidInputError as error:
+            raise InvalidInputError(
+                f"{beside}: holds something else, and would be overwritten; expected another --output"
+            ) from error
 
 
 def _check_pdf(path: Path) -> None:

@@ -21,7 +21,7 @@ from atg_fg.storage.uai_export import export_trial
 
 app = typer.Typer(
     help="Solve discrete factor graphs in the UAI format, and write trials as such. "
-    "Example: atg-fg uai solve trial.uai --evidence trial.uai.evid",
+    "Example: atg-fg uai solve trial.uai --evidence trial.uai.evid --task MAR",
     no_args_is_help=True,
 )
 

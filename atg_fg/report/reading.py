@@ -22,7 +22,7 @@ from atg_fg.storage.compact_file import is_compact
 from atg_fg.storage.database.connection import is_database
 from atg_fg.storage.memory_files import load_memory
 from atg_fg.storage.memory_json import MEMORY_FORMAT, memory_from_document
-from atg_fg.storage.plain_files import read_text_file, readable_again
+from atg_fg.storage.plain_files import cannot_read, read_text_file, readable_again
 from atg_fg.storage.recorded_test import recorded_tests
 from atg_fg.storage.trial_record import TRIAL_FORMAT
 
@@ -54,8 +54,7 @@ def _report_of(path: Path, memory: RobotMemory | None) -> Report:
         with path.open("rb") as file:
             start = file.read(4096)
     except (OSError, ValueError) as error:
-        reason = error.strerror if isinstance(error, OSError) else error
-        raise InvalidInputError(f"{path}: cannot be read: {reason}; {_EXPECTED}") from error
+        raise cannot_read(path, error, _EXPECTED.removeprefix("expected ")) from error
     if is_database(path):
         return read_database(path, memory)
     if start.startswith(_GZIP):

@@ -23,6 +23,7 @@ from atg_fg.senses.opencv import cv2
 Source: TypeAlias = Literal["camera", "video", "images"]
 #: Seconds that a frame may take, the first one too.
 TIMEOUT: Final = 10.0
+_MOST_CAMERAS: Final = 99
 _AHEAD = 4  # frames read ahead from a file
 
 
@@ -146,13 +147,23 @@ def _exactly(pipe: IO[bytes], length: int) -> bytes | None:
 
 def _check_name(source: Source, name: str) -> None:
     if source == "camera":
-        if not name.isdecimal():
-            raise InvalidInputError(f"camera: {name!r}; expected its number, 0 for the first one")
+        if not (name.isascii() and name.isdecimal() and int(name) <= _MOST_CAMERAS):
+            raise InvalidInputError(
+                f"camera: {name!r}; expected its number, 0 for the first one, at most {_MOST_CAMERAS}"
+            )
     elif source == "video":
-        if "://" not in name and not Path(name).is_file():
-            raise InvalidInputError(f"{name}: no such file; expected a video")
-    elif not Path(name).exists():
-        raise InvalidInputError(f"{name}: no such file or folder; expected images")
+        if "://" not in name:
+            check_plain_file(name, "a video")
+    elif not Path(name).is_dir():
+        check_plain_file(name, "an image, or a folder of images")
+
+
+def check_plain_file(path: str | Path, expected: str) -> None:
+    """Raise ``InvalidInputError`` unless there is a plain file at ``path``: one that can be read again, and ends."""
+    there = Path(path)
+    if not there.is_file():
+        what = "a folder" if there.is_dir() else "no plain file" if there.exists() else "no such file"
+        raise InvalidInputError(f"{path}: {what}; expected {expected}")
 
 
 def read_image(path: str | Path) -> NDArray[np.uint8]:
@@ -161,8 +172,7 @@ def read_image(path: str | Path) -> NDArray[np.uint8]:
     Raises:
         InvalidInputError: It cannot be read, is no image, or has more than ``frame_reader.MOST_PIXELS`` pixels.
     """
-    if not Path(path).is_file():
-        raise InvalidInputError(f"{path}: no such file; expected an image")
+    check_plain_file(path, "an image")
     try:
         image = cv2.imread(str(path), cv2.IMREAD_COLOR)
     except cv2.error as error:

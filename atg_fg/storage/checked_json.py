@@ -20,6 +20,9 @@ from atg_fg.core.errors import InvalidInputError
 MAX_DEPTH: Final = 20
 
 
+_SOUND: Final = "a JSON document, with finite numbers and each key once"
+
+
 def parse_json(document: str, place: str) -> Any:
     """Return the JSON in the text ``document``; numbers that are not finite, and repeated keys, are refused.
 
@@ -31,7 +34,9 @@ def parse_json(document: str, place: str) -> Any:
             document, parse_float=_finite, parse_constant=_refuse_constant, object_pairs_hook=_unique_keys
         )
     except (ValueError, RecursionError, MemoryError) as error:
-        raise InvalidInputError(f"{place}: not valid JSON: {str(error) or 'not enough memory'}") from error
+        raise InvalidInputError(
+            f"{place}: not valid JSON: {str(error) or 'not enough memory'}; expected {_SOUND}"
+        ) from error
 
 
 def plain_json(value: Any) -> Any:

@@ -102,7 +102,9 @@ def _sound_lines(path: Path, *, packed: bool) -> tuple[list[Any], int]:
     content = read_bytes_file(path)
     try:
         for text, end in gzip_members(content, path) if packed else _text_lines(content):
-            lines.append(parse_json(text.decode(), f"{path}: line {len(lines) + 1}"))
+            # What was unpacked and packed again is one member of many lines.
+            for line in text.removesuffix(b"\n").split(b"\n"):
+                lines.append(parse_json(line.decode(), f"{path}: line {len(lines) + 1}"))
             sound = end
     except (zlib.error, UnicodeError) as error:
         raise InvalidInputError(f"{path}: cannot be read: {error}; expected what --records or --log wrote") from error

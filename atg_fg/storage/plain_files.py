@@ -13,6 +13,7 @@ import secrets
 import stat
 import sys
 import tempfile
+import time
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -27,8 +28,25 @@ try:
 except ImportError:  # not on Windows: there, what a killed writer leaves behind stays
     fcntl = None  # type: ignore[assignment]
 
+#: How a gzipped file begins.
+GZIP: Final = b"\x1f\x8b"
+
+
 #: How a file is named while it is written.
 _TEMPORARY: Final = (".atg-fg-", ".tmp")
+
+
+#: Seconds in which someone must begin to write to a named pipe that is read; one that writes may take its time.
+PIPE_WAIT: Final = 5.0
+
+
+#: Bytes that are read at once from what has no size, and seconds between two looks whether someone writes.
+_PART: Final = 2**20
+_POLL: Final = 0.02
+
+
+#: Flag of opening that does not wait for a writer; Windows has neither.
+_NOT_WAITING: Final = getattr(os, "O_NONBLOCK", 0)
 
 
 #: Links that are followed in search of an open descriptor; the kernel follows no more.
@@ -43,18 +61,18 @@ def read_bytes_file(path: Path | str) -> bytes:
         TooLargeError: More than ``MAX_FILE_BYTES``, or than ``MAX_UNPACKED_BYTES`` from what has no size.
     """
     try:
-        with open(path, "rb") as file:
+        with open(path, "rb", opener=_open_without_waiting) as file:
             status = os.fstat(file.fileno())
             plain = stat.S_ISREG(status.st_mode)
             limit = byte_limit(MAX_FILE_BYTES if plain else MAX_UNPACKED_BYTES)
             if plain and status.st_size > limit:
                 raise refuse_size(path, limit)
-            content = file.read() if plain else _at_most(file, limit + 1)
+            begin = _begin_of_pipe(file, path, status)
+            content = file.read() if plain else begin + _at_most(file, limit + 1)
     except (OSError, ValueError, MemoryError) as error:
-        if isinstance(error, TooLargeError):
+        if isinstance(error, (InvalidInputError, TooLargeError)):
             raise
-        reason = error.strerror if isinstance(error, OSError) else str(error) or "not enough memory"
-        raise InvalidInputError(f"{path}: cannot be read: {reason}") from error
+        raise cannot_read(path, error) from error
     if len(content) > limit:
         raise refuse_size(path, limit)
     return content
@@ -71,7 +89,8 @@ def read_text_file(path: Path | str) -> str:
     try:
         return content.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeError as error:
-        raise InvalidInputError(f"{path}: not a UTF-8 text file: {error}") from error
+        what = "a gzipped file" if content.startswith(GZIP) else f"not UTF-8: {error}"
+        raise InvalidInputError(f"{path}: {what}; expected a UTF-8 text file") from error
 
 
 def starts_with(path: Path | str, start: bytes) -> bool:
@@ -225,10 +244,43 @@ def make_folder(path: Path | str) -> Path:
     return folder
 
 
+def cannot_read(path: Path | str, error: Exception, expected: str = "a file that can be read") -> InvalidInputError:
+    """Return the error about a file that cannot be read."""
+    reason = error.strerror if isinstance(error, OSError) else str(error) or "not enough memory"
+    return InvalidInputError(f"{path}: cannot be read: {reason}; expected {expected}")
+
+
+def _open_without_waiting(path: str, flags: int) -> int:
+    """Open a file, a named pipe even if no one writes to it yet."""
+    return os.open(path, flags | _NOT_WAITING)
+
+
+def _begin_of_pipe(file: IO[bytes], path: Path | str, status: os.stat_result) -> bytes:
+    """Return the first bytes of a pipe, nothing of other files, and let all that is read from now on be waited for.
+
+    Raises:
+        InvalidInputError: No one writes to the pipe within ``PIPE_WAIT`` seconds.
+    """
+    begin, end = b"", time.monotonic() + PIPE_WAIT
+    while stat.S_ISFIFO(status.st_mode) and not begin:
+        try:
+            begin = os.read(file.fileno(), _PART)
+        except BlockingIOError:
+            break  # someone has it open, and has not written yet
+        if not begin and time.monotonic() > end:
+            raise InvalidInputError(
+                f"{path}: a pipe to which no one writes for {PIPE_WAIT:g} s; expected a file, or a pipe with a writer"
+            )
+        time.sleep(0 if begin else _POLL)
+    if _NOT_WAITING:
+        os.set_blocking(file.fileno(), True)
+    return begin
+
+
 def _at_most(file: IO[bytes], n_bytes: int) -> bytes:
     """Return what a stream holds, but not more than so many bytes of it."""
     parts, left = [], n_bytes
-    while left and (part := file.read(min(left, 2**20))):
+    while left and (part := file.read(min(left, _PART))):
         parts.append(part)
         left -= len(part)
     return b"".join(parts)

@@ -65,7 +65,8 @@ def make_world(name: str, /, **options: Any) -> World:
         of_options = name in WORLDS or "unexpected keyword argument" in str(error)
         if isinstance(error, (TypeError, ValueError, OverflowError, AttributeError)) and not of_options:
             raise  # a fault of the world's own
-        raise InvalidInputError(f"world {name!r}: cannot be made: {error}") from error
+        what = "" if of_options else "; expected module:namespace/Id-v0, an id that the module registers"
+        raise InvalidInputError(f"world {name!r}: cannot be made: {error}{what}") from error
 
 
 def make_world_with(name: str, n_objects: int, seed: int, /, **options: Any) -> World:

@@ -65,3 +65,13 @@ def test_bad_input_is_one_line_and_writes_nothing(refused, tmp_path, monkeypatch
     monkeypatch.chdir(tmp_path)
     assert message in refused("print", "cube", *arguments)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_what_stands_where_the_tags_would_be_written_is_spared(refused, run, tmp_path):
+    tags = tmp_path / "cube.json"
+    tags.write_text('{"mine": 1}')
+    assert "cube.json: holds something else" in refused("print", "cube", "-o", tmp_path / "cube.pdf")
+    assert (tags.read_text(), [path.name for path in tmp_path.iterdir()]) == ('{"mine": 1}', ["cube.json"])
+    tags.unlink()
+    for _ in range(2):  # tags of cubes may take the place of others, as their sheet does
+        run("print", "cube", "-o", tmp_path / "cube.pdf")

@@ -277,7 +277,7 @@ def test_another_memory_is_refused(trial, record):
         (b'{"format": "atg-fg/preset"}', "is of 'atg-fg/preset'; expected a trial's record"),
         (b'{"command": "table1"}', "expected a result that atg-fg table1 --json wrote"),
         (b'{"command": "figure3", "points": [{"actions": "x"}]}', "expected a result that atg-fg figure3"),
-        (b"\xff\xfe", "not a UTF-8 text file"),
+        (b"\xff\xfe", "not UTF-8"),
         (b"\x1f\x8b\x08 broken", "cannot be read"),
         (gzip.compress(b'{"format": "atg-fg/goal-run", "version": 1}'), "key 'served' is missing"),
         (gzip.compress(b'{"format": "atg-fg/test", "version": 1}\n'), "no trials; expected at least one"),

@@ -1,3 +1,4 @@
+import os
 import time
 
 import cv2
@@ -90,7 +91,12 @@ def test_a_camera_gives_its_last_frame_and_leaves_out_those_nobody_took(tmp_path
         ("camera", "front", "camera: 'front'; expected its number, 0 for the first one"),
         ("camera", "-1", "camera: '-1'; expected its number"),
         ("video", "nowhere.mp4", "nowhere.mp4: no such file; expected a video"),
-        ("images", "nowhere", "nowhere: no such file or folder; expected images"),
+        ("images", "nowhere", "nowhere: no such file; expected an image, or a folder of images"),
+        ("camera", "9" * 20, "expected its number, 0 for the first one, at most 99"),
+        ("camera", "²", "camera: '²'; expected its number"),
+        ("video", "/", "/: a folder; expected a video"),
+        ("video", os.devnull, "no plain file; expected a video"),
+        ("images", os.devnull, "no plain file; expected an image, or a folder of images"),
     ],
 )
 def test_a_name_that_cannot_be_is_refused_at_once(source, name, message):

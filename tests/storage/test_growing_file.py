@@ -57,6 +57,20 @@ def test_two_writers_of_the_same_lines_do_no_harm(file, packed):
     assert read_lines(file.path, packed=packed)[1:] == [{"number": number} for number in range(3)]
 
 
+def test_lines_that_were_unpacked_and_packed_again_are_the_same_lines(tmp_path):
+    file = GrowingFile(tmp_path / "lines", HEADER, "the lines", packed=True)
+    file.begin()
+    for number in range(3):
+        file.append({"number": number})
+    lines = read_lines(file.path, packed=True)
+    file.path.write_bytes(gzip.compress(gzip.decompress(file.path.read_bytes())))
+    assert read_lines(file.path, packed=True) == lines
+    again = GrowingFile(file.path, HEADER, "the lines", packed=True)
+    again.resume()
+    again.append({"number": 3})
+    assert read_lines(file.path, packed=True) == [*lines, {"number": 3}]
+
+
 def test_another_file_is_refused_and_left_as_it_is(file, packed):
     file.begin()
     before = file.path.read_bytes()

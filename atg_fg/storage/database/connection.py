@@ -14,7 +14,7 @@ from urllib.parse import quote
 from atg_fg.core.errors import BusyMemoryError, InvalidInputError
 from atg_fg.storage.database import schema
 from atg_fg.storage.database.distrust import DistrustfulConnection
-from atg_fg.storage.plain_files import starts_with
+from atg_fg.storage.plain_files import cannot_read, starts_with
 
 #: Seconds that a writer waits for another one to end its transaction.
 WAIT: Final = 5.0
@@ -207,7 +207,6 @@ def _check_file(path: Path | str) -> None:
     except (OSError, ValueError) as error:
         if isinstance(error, InvalidInputError):
             raise
-        reason = error.strerror if isinstance(error, OSError) else str(error)
-        raise InvalidInputError(f"{path}: cannot be read: {reason}") from error
+        raise cannot_read(path, error, "a memory database") from error
     if head not in (b"", _MAGIC):
         raise InvalidInputError(f"{path}: not an SQLite file; expected a memory database")

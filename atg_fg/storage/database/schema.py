@@ -106,7 +106,8 @@ def _version_of(connection: sqlite3.Connection, place: str) -> int:
 
 def _check_definitions(connection: sqlite3.Connection, version: int, place: str) -> None:
     found, expected = _definitions(connection), _definitions_of(MIGRATIONS[:version])
-    for kind, name, _, text in sorted(found ^ expected, key=repr):
+    # What is there too much is told before what is not there: it may stand in its place.
+    for kind, name, _, text in (*sorted(found - expected, key=repr), *sorted(expected - found, key=repr)):
         what = f"defines {kind} {name!r}, {text!r}" if (kind, name, _, text) in found else f"no such {kind}: {name}"
         raise InvalidInputError(
             f"{place}: {what}; expected a memory of atg-fg, with its tables and indices and nothing else"

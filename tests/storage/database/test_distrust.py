@@ -26,6 +26,10 @@ FOREIGN = {
         f"CREATE VIEW experiments (id, kind, seed, parameters, version) AS {ENDLESS} "
         "SELECT i, 'test', 0, '{}', 'x' FROM n",
     ],
+    "a view in place of a table with an index": [
+        "DROP TABLE raw_trials",
+        "CREATE VIEW raw_trials (number, graph, observed, actions) AS SELECT 1, 1, '', ''",
+    ],
     "a table": ["CREATE TABLE more (a)"],
     "a virtual table": ["CREATE VIRTUAL TABLE more USING fts5(a)"],
     "an index": ["CREATE INDEX more ON trials (verdict)"],
