@@ -11,7 +11,14 @@ import numpy as np
 from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.learning import gibbs_kernels, kernels
 from atg_fg.learning.chain import Chain, Structure, Task
-from atg_fg.learning.populations import HOPELESS, Conclusion, Population, is_milestone, votes_by_name
+from atg_fg.learning.populations import (
+    HOPELESS,
+    Conclusion,
+    Population,
+    is_milestone,
+    objects_by_label,
+    votes_by_name,
+)
 from atg_fg.learning.raw_trials import Recording
 from atg_fg.learning.saved_chain import SavedChain
 
@@ -61,7 +68,7 @@ class AutomatonPopulation(Population):
         elif is_milestone(len(names)):
             worst = int(np.argmin([chain.score for chain in self.chains]))
             self.chains[worst] = self._annealed(task, rng)
-        votes = []
+        votes, objects = [], []
         for chain in self.chains:
             if len(chain.clusters.owner) < len(names):
                 known = len(chain.clusters.owner)
@@ -70,13 +77,17 @@ class AutomatonPopulation(Population):
                     predictive.append(chain.log_predictive(task))
                 chain.place(task, np.arange(known, len(names)), rng)
             own, scores = np.zeros(int(names.max(initial=-1)) + 2), []
+            of_all = np.zeros((len(names), len(own) - 1 + len(names)))
             for sweep in range(OWN_SWEEPS if self._may_own else AUTOMATON_SWEEPS):
-                own += votes_by_name(chain, chain.sweep(task, rng, automaton=True), names, task)
+                moved = chain.sweep(task, rng, automaton=True)
+                own += votes_by_name(chain, moved.last, names, task)
                 if sweep >= OWN_SWEEPS // 2:
                     scores.append(chain.log_joint(task))
+                    of_all += objects_by_label(chain, moved, names, task)
             chain.score = float(np.mean(scores))
             votes.append(own)
-        conclusion = self._conclude(votes, AUTOMATON_TEMPERATURE)
+            objects.append(of_all)
+        conclusion = self._conclude(votes, objects, AUTOMATON_TEMPERATURE)
         best = max(self.chains, key=lambda chain: chain.score)
         self.chains = [chain if chain.score > best.score - HOPELESS else best.copy() for chain in self.chains]
         if not predictive:
@@ -125,10 +136,7 @@ class AutomatonPopulation(Population):
     def _annealed(self, task: Task, rng: np.random.Generator) -> Chain:
         chain = self._new(rng)
         chain.admit(task)
-        chain.scatter(rng)
-        chain.log_joint(task)
-        for beta in np.geomspace(RESTART_HOTTEST, 1.0, RESTART_SWEEPS).tolist():
-            chain.sweep(task, rng, beta, automaton=True)
+        chain.anneal(task, RESTART_HOTTEST, RESTART_SWEEPS, rng)
         return chain
 
 
@@ -162,7 +170,11 @@ class RivalPopulations(Population):
         weights = np.concatenate(
             [share * each.weights for share, each in zip(shares.tolist(), conclusions, strict=True)]
         )
-        result = Conclusion(probabilities, weights)
+        objects = sum(
+            (share * each.objects for share, each in zip(shares.tolist(), conclusions, strict=True)),
+            0.0 * conclusions[0].objects,
+        )
+        result = Conclusion(probabilities, weights, objects)
         if len(names) >= RIVAL_TRIALS:
             for number in alive:
                 if self._log_evidence[number] < logarithms.max() - RIVAL_BEHIND:

@@ -21,7 +21,7 @@ from atg_fg.learning.shared_structure import SharedStructure
 SLIP_PRIOR: Final = (1.0, 99.0)
 #: Probability that two wrong labels of a register are the same if the structure is not the right one.
 RECURRING: Final = 0.4
-#: With more trials than this, only those that the new one touches are moved, and some others.
+#: With more trials than this, a sweep moves only those of objects that the new one may be of, and some others.
 ALL_TRIALS: Final = 200
 OTHER_TRIALS: Final = 50
 TOUCHED: Final = 1e-3
@@ -39,6 +39,24 @@ class Structure(NamedTuple):
     successors: IntArray
     registers: IntArray
     n_registers: int
+
+
+class Votes(NamedTuple):
+    """What trials were drawn by in one sweep.
+
+    Attributes:
+        trials: That were moved, in their order, shape [M].
+        shares: p(cluster | all other trials) of each, *new* last, shape [M, C + 1].
+    """
+
+    trials: IntArray
+    shares: FloatArray
+
+    @property
+    def last(self) -> FloatArray:
+        """Those of the last trial, which is moved last, shape [C + 1]."""
+        row: FloatArray = self.shares[-1]
+        return row
 
 
 class Task(NamedTuple):
@@ -104,6 +122,7 @@ class Chain:
         self.actions: IntArray = np.zeros((0, 0), dtype=np.int64)
         self.slip = SLIP_PRIOR[0] / sum(SLIP_PRIOR)
         self.score = -np.inf
+        self._touched: IntArray = np.zeros(0, dtype=np.int64)
 
     def copy(self) -> Chain:
         """Return a chain that goes on alone from here."""
@@ -189,15 +208,33 @@ class Chain:
         self.clusters.n_trials[:n_trials] = 1
         self.clusters.start[:] = rng.integers(self.n_states, size=n_trials)
 
+    def anneal(self, task: Task, hottest: float, n_sweeps: int, rng: np.random.Generator) -> None:
+        """Forget which trials are of one object, and cool down from there with all else, successors too.
+
+        With more trials than ``ALL_TRIALS`` that is done with the newest; the others are placed in the end.
+        """
+        self.scatter(rng)
+        newest = np.arange(max(len(self.clusters.owner) - ALL_TRIALS, 0), len(self.clusters.owner))
+        self.clusters.owner[: newest[0]] = -1
+        self.clusters.n_trials[: newest[0]] = 0
+        self._learn_again(task)
+        for beta in np.geomspace(hottest, 1.0, n_sweeps).tolist():
+            self._move_successors(task, beta, rng)
+            self._moved(task, np.append(rng.permutation(newest[:-1]), newest[-1]), beta, rng)
+        if newest[0]:
+            self.place(task, np.arange(newest[0]), rng)
+
     def place(self, task: Task, numbers: IntArray, rng: np.random.Generator) -> None:
         """Draw object and start of trials that are of no object yet, one after the other."""
         self._learn_again(task)
-        gibbs_kernels.sweep(
-            self.trials(task), numbers, self.clusters, task.log_new, self._log_own(task), 1.0, rng, np.zeros(0)
-        )
+        votes = self._moved(task, numbers, 1.0, rng).last
+        # Which objects the last one touches is settled here for all sweeps, so that each of these leaves the
+        # distribution of what it moves as it was.
+        objects = np.flatnonzero(votes[:-1] > TOUCHED)
+        self._touched = np.flatnonzero(np.isin(self.clusters.owner[:-1], objects))
 
-    def sweep(self, task: Task, rng: np.random.Generator, beta: float = 1.0, *, automaton: bool = False) -> FloatArray:
-        """Move all trials once, the last one at the end; return p(cluster of the last one | all others), *new* last.
+    def sweep(self, task: Task, rng: np.random.Generator, beta: float = 1.0, *, automaton: bool = False) -> Votes:
+        """Move trials once, the last one at the end: all of them, or those that ``ALL_TRIALS`` leaves.
 
         Args:
             task: What there is to explain.
@@ -205,18 +242,25 @@ class Chain:
             beta: Inverse temperature.
             automaton: Whether the successors move too.
         """
-        trials = self.trials(task)
         if automaton:
-            for number in (0, *self.own_automata):
-                gibbs_kernels.transition_moves(trials, self.clusters, number, beta, rng)
-        votes = np.zeros(len(self.clusters.n_trials) + 1)
+            self._move_successors(task, beta, rng)
+        return self._moved(task, self._order(rng), beta, rng)
+
+    def _move_successors(self, task: Task, beta: float, rng: np.random.Generator) -> None:
+        # An entry costs as much as there are trials: where there are many, some are moved in each sweep.
+        n_entries = max(self.successors.size * ALL_TRIALS // max(len(self.clusters.owner), ALL_TRIALS), 1)
+        for number in (0, *self.own_automata):
+            gibbs_kernels.transition_moves(self.trials(task), self.clusters, number, n_entries, beta, rng)
+
+    def _moved(self, task: Task, order: IntArray, beta: float, rng: np.random.Generator) -> Votes:
+        votes = np.zeros((len(order), len(self.clusters.n_trials) + 1))
         gibbs_kernels.sweep(
-            trials, self._order(rng), self.clusters, task.log_new, self._log_own(task), beta, rng, votes
+            self.trials(task), order, self.clusters, task.log_new, self._log_own(task), beta, rng, votes
         )
-        return votes
+        return Votes(order, votes)
 
     def slip_sweep(self, task: Task, rng: np.random.Generator, *, thorough: bool) -> FloatArray:
-        """Move the slips of trials, and the last one by forward filtering; return what ``sweep`` does.
+        """Move slips, and the last trial by forward filtering; return its p(cluster | all others), *new* last.
 
         Args:
             task: What there is to explain.
@@ -261,6 +305,24 @@ class Chain:
             looks = np.zeros((len(result), n_names))
             np.add.at(looks, (self.clusters.owner[named], names[named]), task.recording.lengths[named])
             result = np.where(looks.any(axis=1), looks.argmax(axis=1), -1)
+        return result
+
+    def labels(self, names: IntArray, task: Task) -> IntArray:
+        """Return which object each cluster is, −1 of one without trials, shape [C].
+
+        That is the number of a name for the largest of the clusters that most of its looks give it; of any other
+        cluster it is that of no name, the number of names and of the cluster's first trial added up.
+        """
+        clusters, objects = self.clusters, self.objects(names, task)
+        n_names, live = int(names.max(initial=-1)) + 1, np.flatnonzero(clusters.n_trials)
+        looks = np.bincount(clusters.owner, task.recording.lengths, len(clusters.n_trials))
+        result = np.full(len(clusters.n_trials), -1)
+        first = np.full(len(result), len(names))
+        np.minimum.at(first, clusters.owner, np.arange(len(names)))
+        result[live] = n_names + first[live]
+        for cluster in live[np.argsort(-looks[live], kind="stable")].tolist():
+            if objects[cluster] >= 0 and objects[cluster] not in result:
+                result[cluster] = objects[cluster]
         return result
 
     def log_odds_of_mistakes(self, task: Task) -> float:
@@ -321,8 +383,13 @@ class Chain:
         return float(kernels.learn_all_again(self.trials(task), self.clusters, -1, path))
 
     def _order(self, rng: np.random.Generator) -> IntArray:
-        n_others = len(self.clusters.owner) - 1
-        order: IntArray = np.append(rng.permutation(n_others), n_others)
+        last = len(self.clusters.owner) - 1
+        moving = np.arange(last)
+        if last > ALL_TRIALS:
+            touched = rng.permutation(self._touched)[: ALL_TRIALS - OTHER_TRIALS]
+            others = np.setdiff1d(moving, touched)
+            moving = np.append(touched, rng.choice(others, OTHER_TRIALS, replace=False))
+        order: IntArray = np.append(rng.permutation(moving), last)
         return order
 
     def _slips(self, task: Task) -> tuple[int, int]:

@@ -20,6 +20,8 @@ from atg_fg.learning.saved_chain import SavedChain
 
 #: A structure that takes more labels than this for wrong explains nothing.
 MOST_WRONG: Final = 0.3
+#: A trial is given to another object that it is of with a greater probability than this.
+MENDED: Final = 0.5
 #: Chains of less weight are not followed through a trial.
 LEAST_WEIGHT: Final = 1e-3
 
@@ -88,6 +90,7 @@ class _State(NamedTuple):
     weights: FloatArray
     n_trials: int
     log_evidence: float
+    objects: FloatArray
 
 
 class EvidenceLearner:
@@ -100,7 +103,7 @@ class EvidenceLearner:
     def __init__(self, learner: StructureLearner) -> None:
         self.learner, self.assumptions, self.seed = learner, learner.assumptions, learner.seed
         noise = DetectorNoise.unknown(self.assumptions.alphabet.n_symbols)
-        self._state = _State(None, noise, np.zeros(0), 0, 0.0)
+        self._state = _State(None, noise, np.zeros(0), 0, 0.0, np.zeros((0, 0)))
         self._concluded: tuple[RawTrial, _State, Verdict] | None = None
         self._saved: SavedEvidence | None = None
 
@@ -126,7 +129,7 @@ class EvidenceLearner:
             task = self._task(self.learner.trials[: saved.n_trials], saved.noise)
             population.restore(saved.chains, task)
             weights = np.array(saved.weights)
-            self._state = _State(population, saved.noise, weights, saved.n_trials, saved.log_evidence)
+            self._state = _State(population, saved.noise, weights, saved.n_trials, saved.log_evidence, np.zeros((0, 0)))
         return self._state
 
     def copy(self, learner: StructureLearner) -> EvidenceLearner:
@@ -186,12 +189,24 @@ class EvidenceLearner:
         ]
 
     def objects(self) -> list[int]:
-        """Return which trials are of one object by the best chain: a number each, the same for the same object."""
-        state = self._current
-        if state.population is None:
-            return []
-        owners: list[int] = state.population.chains[int(state.weights.argmax())].clusters.owner.tolist()
-        return owners
+        """Return which trials are of one object: a number each, the same for the same object.
+
+        A trial is of another object than it was taken for where that is more probable than not, averaged over chains
+        and sweeps.
+        """
+        state, n_trials = self._current, len(self.learner.trials)
+        names = tuple(dict.fromkeys(self.learner.owners[: n_trials - 1]))
+        # The last trial may have founded an object.
+        stays = [*self._numbers(self.learner.owners[:-1], names).tolist(), -1]
+        if self.learner.owners[-1] in names:
+            stays[-1] = names.index(self.learner.owners[-1])
+        else:
+            stays[-1] = len(names) + n_trials - 1
+        if state.objects.shape != (n_trials, len(names) + n_trials):
+            return stays
+        best = state.objects.argmax(axis=1)
+        result: list[int] = np.where(state.objects.max(axis=1) > MENDED, best, stays).tolist()
+        return result
 
     def best(self) -> Chain | None:
         """Return the chain of most weight, ``None`` if nothing was sampled."""
@@ -233,7 +248,7 @@ class EvidenceLearner:
         conclusion = population.advance(task, numbers, rng)
         noise = population.tally(task, conclusion.weights, state.noise)
         log_evidence = population.log_evidence(task) - self._log_scale(task)
-        learned = _State(population, noise, conclusion.weights, len(trials), log_evidence)
+        learned = _State(population, noise, conclusion.weights, len(trials), log_evidence, conclusion.objects)
         return learned, Verdict(names, conclusion.probabilities)
 
     def _population(self) -> Population:

@@ -89,13 +89,13 @@ def log_total(logarithms: FloatArray) -> float:
 
 @compiled
 def transition_moves(
-    trials: TrialArrays, clusters: Clusters, automaton: int, beta: float, rng: np.random.Generator
+    trials: TrialArrays, clusters: Clusters, automaton: int, n_entries: int, beta: float, rng: np.random.Generator
 ) -> None:
-    """Draw each entry of an automaton's successors given all else: objects, starts, and the other entries."""
+    """Draw so many entries of an automaton's successors given all else: objects, starts, and the other entries."""
     successors = clusters.successors[automaton]
     n_actions, n_states = successors.shape[0] - 1, successors.shape[1]
     path, scores = np.empty(trials.looks.shape[1], np.int64), np.empty(n_states)
-    for entry in rng.permutation(n_actions * n_states):
+    for entry in rng.permutation(n_actions * n_states)[:n_entries]:
         action, state = entry // n_states, entry % n_states
         for successor in range(n_states):
             successors[action, state] = successor
@@ -169,7 +169,8 @@ def begin_own(trials: TrialArrays, trial: int, clusters: Clusters, free: int, rn
             clusters.successors[own, action, state] = rng.integers(0, n_states)
     put_in(trials, trial, clusters, free, int(rng.integers(0, n_states)), np.empty(trials.looks.shape[1], np.int64))
     for step in range(OWN_SWEEPS):
-        transition_moves(trials, clusters, own, OWN_HOTTEST ** (1.0 - step / (OWN_SWEEPS - 1)), rng)
+        beta = OWN_HOTTEST ** (1.0 - step / (OWN_SWEEPS - 1))
+        transition_moves(trials, clusters, own, clusters.successors[own].size, beta, rng)
 
 
 @compiled
@@ -212,8 +213,9 @@ def count_votes(weights: FloatArray, free: int, votes: FloatArray) -> None:
     """Add p(cluster), summed over the second axis of logarithms, to votes, *new* after all that there are."""
     total, new = log_total(weights.ravel()), len(votes) - 1
     for cluster in range(len(weights)):
-        # What is beyond the clusters is new as well.
-        votes[new if cluster == free or cluster >= new else cluster] += np.exp(weights[cluster] - total).sum()
+        if weights[cluster].max() > -np.inf:
+            # What is beyond the clusters is new as well.
+            votes[new if cluster == free or cluster >= new else cluster] += np.exp(weights[cluster] - total).sum()
 
 
 @compiled
@@ -235,8 +237,6 @@ def sweep(
     rng: np.random.Generator,
     votes: FloatArray,
 ) -> None:
-    """Move trials in this order; votes are counted for the last of them."""
-    nobody = np.zeros(0)
+    """Move trials in this order; p(cluster | all others) of each is added to its row of votes, shape [M, C + 1]."""
     for position in range(len(order)):
-        is_last = position == len(order) - 1
-        trial_move(trials, order[position], clusters, log_new, log_own, beta, rng, votes if is_last else nobody)
+        trial_move(trials, order[position], clusters, log_new, log_own, beta, rng, votes[position])

@@ -15,7 +15,7 @@ import numpy as np
 from atg_fg.core.errors import TooLargeError
 from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.learning import kernels
-from atg_fg.learning.chain import Chain, Structure, Task
+from atg_fg.learning.chain import Chain, Structure, Task, Votes
 from atg_fg.learning.detector_noise import DetectorNoise
 from atg_fg.learning.raw_trials import Recording
 from atg_fg.learning.register_search import search_registers
@@ -38,11 +38,14 @@ class Conclusion(NamedTuple):
     Attributes:
         probabilities: p(the trial is of the object of each name | all trials), *new* last, shape [names + 1].
         weights: Of the chains, in their order; they sum to one.
+        objects: p(each trial is of the object of each name | all other trials), then of an object without a name, by
+            its first trial, shape [N, names + N]; rows of trials that were not moved are all zero.
         log_predictive: ln p(the trial | all others) before it was taken in, up to the scale of its looks.
     """
 
     probabilities: FloatArray
     weights: FloatArray
+    objects: FloatArray
     log_predictive: float = 0.0
 
 
@@ -96,12 +99,14 @@ class Population(ABC):
                 chain.tally(task, weight / weights[weights > 0.01].sum(), right, truth)
         return noise.learned(recording.labels, recording.confidences, right, truth)
 
-    def _conclude(self, votes: list[FloatArray], temperature: float) -> Conclusion:
+    def _conclude(self, votes: list[FloatArray], objects: list[FloatArray], temperature: float) -> Conclusion:
         scores = np.array([chain.score for chain in self.chains])
         weights = np.exp((scores - scores.max()) / temperature)
         weights /= weights.sum()
         shares = np.array([each / each.sum() for each in votes])
-        return Conclusion(weights @ shares, weights)
+        total = sum((weight * each for weight, each in zip(weights.tolist(), objects, strict=True)), 0.0 * objects[0])
+        total /= np.maximum(total.sum(axis=1, keepdims=True), np.finfo(float).tiny)
+        return Conclusion(weights @ shares, weights, total)
 
 
 def votes_by_name(chain: Chain, votes: FloatArray, names: IntArray, task: Task) -> FloatArray:
@@ -111,6 +116,20 @@ def votes_by_name(chain: Chain, votes: FloatArray, names: IntArray, task: Task) 
     there = objects >= 0
     np.add.at(result, objects[there], votes[:-1][there])
     result[-1] = votes[-1]
+    return result
+
+
+def objects_by_label(chain: Chain, votes: Votes, names: IntArray, task: Task) -> FloatArray:
+    """Return votes of one sweep for the object of each trial, as ``Conclusion.objects`` has them."""
+    labels, n_names = chain.labels(names, task), int(names.max(initial=-1)) + 1
+    result = np.zeros((len(names), n_names + len(names)))
+    there = labels >= 0
+    clusters, trials = chain.clusters, votes.trials
+    for label, share in zip(labels[there].tolist(), votes.shares[:, :-1][:, there].T, strict=True):
+        result[trials, label] += share
+    # A trial that would be the first of an object is that of the cluster where it is alone, or of one still to come.
+    alone = clusters.n_trials[clusters.owner[trials]] == 1
+    result[trials, np.where(alone, labels[clusters.owner[trials]], n_names + trials)] += votes.shares[:, -1]
     return result
 
 
@@ -132,23 +151,25 @@ class RegisterPopulation(Population):
         """Take in the last trial of a task; at milestones, search for other maps."""
         if is_milestone(len(names)) or not self.chains:
             self._search(task, rng)
-        votes = []
+        votes, objects = [], []
         for chain in self.chains:
             known = len(chain.clusters.owner)
             if known < len(names):
                 chain.admit(task)
                 chain.place(task, np.arange(known, len(names)), rng)
             own, scores = np.zeros(int(names.max(initial=-1)) + 2), []
+            of_all = np.zeros((len(names), len(own) - 1 + len(names)))
             for sweep in range(MAP_SWEEPS):
                 found = chain.slip_sweep(task, rng, thorough=sweep % 2 == 1)
                 own += votes_by_name(chain, found, names, task)
                 if sweep >= MAP_SWEEPS // 2:
                     scores.append(chain.log_joint(task))
                 if sweep + 1 < MAP_SWEEPS:
-                    chain.sweep(task, rng)
+                    of_all += objects_by_label(chain, chain.sweep(task, rng), names, task)
             chain.score = float(np.mean(scores))
             votes.append(own)
-        conclusion = self._conclude(votes, 1.0)
+            objects.append(of_all)
+        conclusion = self._conclude(votes, objects, 1.0)
         best = max(chain.score for chain in self.chains)
         kept = [number for number, chain in enumerate(self.chains) if chain.score > best - HOPELESS]
         self.chains, self.maps = [self.chains[number] for number in kept], [self.maps[number] for number in kept]
