@@ -29,8 +29,8 @@ class TestResult:
         undecided: Trials in which nothing at all was seen.
         actions: Number of actions of each trial.
         merges: (false merges, merges), if duplicates were merged; false are those of ATGs made from two objects.
-        mended: (trials that at the end are with the ATG of their object, trials learned from), if any trial was given
-            to another ATG than its verdict had said.
+        mended: (trials whose verdict is right as it was mended, trials learned from), if any trial was given to another
+            ATG than its verdict had said.
     """
 
     __test__ = False
@@ -61,7 +61,7 @@ class Score:
         self.lost = self.undecided = 0
         self._actions: list[int] = []
         self.merges = self.false_merges = 0
-        self._learned_from: list[object] = []
+        self._learned_from: list[tuple[object, bool]] = []
         self.mended: int | None = None
         self._made_from: dict[str, object] = dict(made_from or {})
         self._presented: set[object] = set(self._made_from.values())
@@ -84,7 +84,7 @@ class Score:
         self.successes += identified and (right_match or not seen_before)
         self._presented.add(trial.object)
         if learned is not None:
-            self._learned_from.append(trial.object)
+            self._learned_from.append((trial.object, seen_before))
             if trial.verdict == "novel":
                 self._made_from[learned] = trial.object
 
@@ -92,7 +92,8 @@ class Score:
         """Take note of raw trials that the memory has given to other ATGs than they had been.
 
         An ATG that took part in this counts as made from the object that most of its trials were of, the first of them
-        if there are as many of others.
+        if there are as many of others. A mended verdict is that a trial is of a new object if it is now the first of its
+        ATG, else that it is of that ATG's, and is right as one that was given is.
         """
         if not isinstance(memory, StructuredMemory) or not memory.reassignments:
             return
@@ -100,19 +101,16 @@ class Score:
         if len(owners) != len(self._learned_from):
             return  # trials from before this test are not ours to judge
         by_name: defaultdict[str, Counter[object]] = defaultdict(Counter)
-        for name, presented in zip(owners, self._learned_from, strict=True):
+        for name, (presented, _) in zip(owners, self._learned_from, strict=True):
             by_name[name][presented] += 1
         for name in {name for each in memory.reassignments for name in (each.old, each.new)}:
             if name in by_name:
                 self._made_from[name] = by_name[name].most_common(1)[0][0]
-        largest: dict[object, str] = {}
-        for name, objects in by_name.items():
-            presented = self._made_from[name]
-            if presented not in largest or objects.total() > by_name[largest[presented]].total():
-                largest[presented] = name
-        self.mended = sum(
-            largest.get(presented) == name for name, presented in zip(owners, self._learned_from, strict=True)
-        )
+        self.mended, begun = 0, set[str]()
+        for name, (presented, seen_before) in zip(owners, self._learned_from, strict=True):
+            right = self._made_from.get(name) == presented if name in begun else not seen_before
+            self.mended += right
+            begun.add(name)
 
     def name_of(self, presented: object) -> str | None:
         """Return the name of the first ATG that was made from an object, ``None`` if there is none."""
@@ -185,7 +183,7 @@ def actions_a_trial(results: Iterable[TestResult]) -> dict[str, Any]:
 
 
 def _mended(tests: Sequence[TestResult]) -> dict[str, Any]:
-    """Return how many trials are with the ATG of their object at the end, in tests that mended any."""
+    """Return how many verdicts are right as they were mended, in tests that mended any."""
     counts = [test.mended for test in tests if test.mended is not None]
     if not counts:
         return {}

@@ -49,7 +49,7 @@ def test_a_name_counts_as_of_the_object_that_most_of_its_trials_were_of_once_tri
     assert score.result(0).mended == (4, 4)
 
 
-def test_of_two_atgs_of_one_object_the_larger_one_is_right():
+def test_a_second_atg_of_one_object_counts_as_one_false_novelty_when_mended():
     memory, score = judged([("a", None), ("a", "object-000"), ("a", "object-000"), ("b", None)])
     memory.reassign({2: "object-007"})
     score.mend(memory)

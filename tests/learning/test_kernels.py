@@ -5,6 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
+from atg_fg.learning import chain as sampler
 from atg_fg.learning import gibbs_kernels, kernels, map_kernels, slip_kernels
 from atg_fg.learning.chain import Chain, Structure, Task
 from atg_fg.learning.detector_noise import DetectorNoise
@@ -334,3 +335,40 @@ def test_errors_that_recur_are_the_structures_and_those_that_do_not_are_the_dete
             chain.sweep(task, rng)
         odds.append(chain.log_odds_of_mistakes(task))
     assert odds[0] < 0 < odds[1]
+
+
+def test_beyond_two_hundred_trials_a_sweep_moves_a_bounded_number(monkeypatch):
+    monkeypatch.setattr(sampler, "ALL_TRIALS", 12)
+    monkeypatch.setattr(sampler, "OTHER_TRIALS", 4)
+    rng = np.random.default_rng(16)
+    recording, _ = simulated(rng, 24, 6, [(0, 1, 2), (0, 0, 1), (2, 2, 1)])
+    task = Task.of(recording, DetectorNoise.unknown(3), 3)
+    chain = Chain(RING, 0.0, 3)
+    chain.admit(task)
+    chain.place(task, np.arange(24), rng)
+    moved = [chain.sweep(task, rng) for _ in range(30)]
+    assert {len(votes.trials) for votes in moved} == {13 if len(chain._touched) >= 8 else len(chain._touched) + 5}
+    assert all(votes.trials[-1] == 23 and len({*votes.trials}) == len(votes.trials) for votes in moved)
+    # Chance brings every trial its turn, and each sweep leaves a proper distribution over objects.
+    assert len({*np.concatenate([votes.trials for votes in moved])}) > 20
+    assert np.allclose([row.sum() for votes in moved for row in votes.shares], 1.0)
+
+
+def test_annealing_many_trials_places_all_of_them(monkeypatch):
+    monkeypatch.setattr(sampler, "ALL_TRIALS", 10)
+    rng = np.random.default_rng(17)
+    recording, _ = simulated(rng, 20, 9, [(0, 1, 2), (0, 0, 1)])
+    task = Task.of(recording, DetectorNoise.unknown(3), 2)
+    chain = Chain(RING, 0.0, 3)
+    chain.admit(task)
+    chain.anneal(task, 0.1, 20, rng)
+    assert chain.clusters.owner.min() >= 0
+    assert chain.clusters.n_trials.sum() == 20
+
+
+def test_each_cluster_has_a_label_of_its_own():
+    trials = drawn_trials(np.random.default_rng(18))
+    chain, task = chain_of(trials, [0, 1, 1, 3], [0, 0, 0, 0])
+    # Names: trials 0 and 1 are of object 0, trial 2 is of object 1, the last has none yet.
+    labels = chain.labels(np.array([0, 0, 1, -1]), task)
+    assert labels.tolist() == [2 + 0, 0, -1, 2 + 3, -1, -1]
