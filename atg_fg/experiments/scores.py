@@ -92,8 +92,8 @@ class Score:
         """Take note of raw trials that the memory has given to other ATGs than they had been.
 
         An ATG that took part in this counts as made from the object that most of its trials were of, the first of them
-        if there are as many of others. A mended verdict is that a trial is of a new object if it is now the first of its
-        ATG, else that it is of that ATG's, and is right as one that was given is.
+        if there are as many of others. By its mended verdict a trial is of a new object if it is now the first of its
+        ATG, else of that ATG's; it is right as one that was given is.
         """
         if not isinstance(memory, StructuredMemory) or not memory.reassignments:
             return
