@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from atg_fg.core.patterns import Evidence
 from atg_fg.experiments.ablation import AblationLog, Cell
 from atg_fg.experiments.goals import GoalRunFile
 from atg_fg.learning.structured_memory import StructuredMemory
@@ -73,3 +74,12 @@ def test_ablation_1(tmp_path: Path) -> None:
 def test_scripted_trial_1() -> None:
     file = FORMATS.parent / "scripted_trial.json"
     assert len(read_script(file.read_text()).steps) == 3
+
+
+def test_scripted_trial_2() -> None:
+    script = read_script((FORMATS / "scripted-trial-2.json").read_text())
+    assert not script.memory.assumptions.alphabet.exclusive
+    look = script.steps[0]
+    assert isinstance(look, Evidence)
+    assert look.slots == ((0.0, 0.8, 0.2), None)
+    assert look.confidences == (None, 0.75)

@@ -9,7 +9,7 @@ from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.merging import Merge, check_merges
-from atg_fg.core.patterns import Confidences, Detection
+from atg_fg.core.patterns import Confidences, Detection, SlotLikelihoods
 from atg_fg.core.table import Bar, Cell, Table
 from atg_fg.core.transactions import Persistent, one_transaction
 
@@ -89,6 +89,7 @@ class RobotMemory(Persistent):
         detections: Sequence[Detection],
         actions: Sequence[int],
         confidences: Sequence[Confidences] = (),
+        likelihoods: Sequence[SlotLikelihoods] = (),
     ) -> str:
         """Learn from a raw trial what all objects share: nothing, in a memory that takes each object by itself.
 
@@ -99,6 +100,7 @@ class RobotMemory(Persistent):
             detections: The symbol in each slot at each look, ``None`` where nothing was seen, length t + 1.
             actions: Index of the action between each two, length t.
             confidences: How sure the detector was of each symbol at each look; none if it never says.
+            likelihoods: Of the symbols in each slot at each look, where evidence was no symbol; none if it always was.
         """
         return name
 

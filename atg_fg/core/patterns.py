@@ -9,7 +9,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Final, TypeAlias, TypeVar
 
@@ -31,6 +31,10 @@ Pattern: TypeAlias = tuple[int, ...]
 Detection: TypeAlias = tuple[int | None, ...]
 #: How sure a detector says it is of each slot's symbol, on a scale of its own; ``None`` where it does not say.
 Confidences: TypeAlias = tuple[float | None, ...]
+
+
+#: Likelihood of each symbol in each slot, ``None`` for a slot without one.
+SlotLikelihoods: TypeAlias = tuple[tuple[float, ...] | None, ...]
 
 
 Array = TypeVar("Array", bound=NDArray[Any])
@@ -179,12 +183,15 @@ class Evidence:
         pattern: Index of the pattern if the detection was complete, else ``None``.
         detection: The symbol in each slot as it was seen, if the evidence is of a detection.
         confidences: Of each of these symbols; empty if the detector says nothing of it.
+        slots: Likelihood of each symbol in each slot, ``None`` for a slot without one; empty if not given slot by
+            slot.
     """
 
     likelihood: FloatArray
     pattern: int | None = None
     detection: Detection | None = None
     confidences: Confidences = ()
+    slots: SlotLikelihoods = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "likelihood", read_only(np.array(self.likelihood, dtype=np.float64)))
@@ -195,6 +202,7 @@ class Evidence:
             self.pattern,
             self.detection,
             self.confidences,
+            self.slots,
         )  # so that no copy can be written to, either
 
     @classmethod
@@ -223,6 +231,44 @@ class Evidence:
             if symbol is not None:
                 agrees &= alphabet.symbols[:, slot] == symbol
         return cls(agrees.astype(np.float64), None, checked, stated)
+
+    @classmethod
+    def of_slots(
+        cls,
+        alphabet: PatternAlphabet,
+        likelihoods: Sequence[ArrayLike | None],
+        detection: Sequence[int | None] = (),
+        confidences: Sequence[float | None] = (),
+    ) -> Evidence:
+        """Evidence that is a likelihood of the symbols of some slots, and of a detection in the others.
+
+        The likelihood of a pattern is the product over slots; slots are independent of each other given the pattern.
+
+        Args:
+            alphabet: The patterns.
+            likelihoods: Of each symbol in each slot, non-negative and not all zero, shape [V]; ``None`` of a slot for
+                which the detection counts.
+            detection: The symbol in each slot; ``None`` where nothing was seen, and where there is a likelihood.
+            confidences: As for ``of_detection``.
+
+        Raises:
+            InvalidInputError: Anything does not fit the alphabet, or no pattern is possible.
+        """
+        hard = cls.of_detection(alphabet, detection or (None,) * len(alphabet.slots), confidences)
+        slots = check_slots(likelihoods, alphabet)
+        product = hard.likelihood.copy()
+        for slot, weights in enumerate(slots):
+            if weights is not None:
+                if hard.detection is not None and hard.detection[slot] is not None:
+                    raise InvalidInputError(
+                        f"evidence, slot {alphabet.slots[slot]!r}: a symbol and a likelihood; expected one of them"
+                    )
+                product *= np.array(weights)[alphabet.symbols[:, slot]]
+        if not product.any():
+            raise InvalidInputError("evidence: all zero; expected at least one pattern that it is possible under")
+        if not any(slots):
+            return hard
+        return cls(product, None, hard.detection, hard.confidences, slots)
 
     @classmethod
     def of_likelihood(cls, alphabet: PatternAlphabet, likelihood: ArrayLike) -> Evidence:
@@ -260,8 +306,41 @@ class Evidence:
         if ((weights > 0) & (weights < LEAST_SHARE * greatest)).any():
             weights = np.where(weights < LEAST_SHARE * greatest, 0.0, weights)
         if greatest and not LEAST_SHARE <= greatest <= 1 / LEAST_SHARE:
-            return Evidence(weights / greatest, self.pattern), math.log(greatest)
-        return (self if weights is self.likelihood else Evidence(weights, self.pattern)), 0.0
+            return replace(self, likelihood=weights / greatest), math.log(greatest)
+        return (self if weights is self.likelihood else replace(self, likelihood=weights)), 0.0
+
+
+def check_slots(
+    likelihoods: Sequence[ArrayLike | None], alphabet: PatternAlphabet, place: str = "likelihoods"
+) -> SlotLikelihoods:
+    """Return likelihoods of each slot's symbols as tuples, or raise ``InvalidInputError`` naming ``place``.
+
+    None at all are as good.
+    """
+    if len(likelihoods) not in (0, len(alphabet.slots)):
+        raise InvalidInputError(
+            f"{place}: {len(likelihoods)}; expected one for each of {len(alphabet.slots)} slots, or none"
+        )
+    result: list[tuple[float, ...] | None] = []
+    for slot, given in zip(alphabet.slots, likelihoods, strict=False):
+        if given is None:
+            result.append(None)
+            continue
+        where = f"{place}, slot {slot!r}"
+        try:
+            weights = np.array(given, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise InvalidInputError(f"{where}: {brief(given)}; expected numbers") from error
+        if weights.shape != (alphabet.n_symbols,):
+            raise InvalidInputError(
+                f"{where}: shape {weights.shape}; expected a weight for each of {alphabet.n_symbols} symbols"
+            )
+        if not (weights.min() >= 0 and 0 < weights.sum() < np.inf):  # a NaN is neither
+            raise InvalidInputError(
+                f"{where}: {brief(weights.tolist())}; expected finite ones of at least 0, not all 0"
+            )
+        result.append(tuple(weights.tolist()))
+    return tuple(result)
 
 
 def check_confidences(confidences: Sequence[float | None], n_slots: int, place: str = "confidences") -> Confidences:

@@ -109,11 +109,9 @@ class LearnedStructure(BayesFilter):
         """
         looks, memory = self.history.evidence, self.memory
         chains = [position for position, each in enumerate(self._followed) if isinstance(each, FollowedChain)]
-        seen = [look.detection for look in looks if look.detection is not None]
-        if not chains or not isinstance(memory, StructuredMemory) or len(seen) < len(looks) or self.prior is not None:
+        if not chains or not isinstance(memory, StructuredMemory) or self.prior is not None:
             return self.identity()
-        confidences = tuple(look.confidences for look in looks) if any(look.confidences for look in looks) else ()
-        verdict = memory.evidence.conclude(RawTrial(tuple(seen), tuple(self.history.actions), confidences))
+        verdict = memory.evidence.conclude(RawTrial.of(looks, self.history.actions, memory.assumptions.alphabet))
         beliefs = self._type_beliefs()
         erring = sum(float(beliefs[1 + position].sum()) for position in chains)
         total = sum(beliefs[1:], beliefs[0]) - sum(

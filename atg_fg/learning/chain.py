@@ -10,7 +10,7 @@ import numpy as np
 from atg_fg.core.log_math import log_sum_exp
 from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.learning import gibbs_kernels, kernels, slip_kernels
-from atg_fg.learning.detector_noise import DetectorNoise
+from atg_fg.learning.detector_noise import MOST_CERTAIN, DetectorNoise
 from atg_fg.learning.kernels import Clusters, TrialArrays
 from atg_fg.learning.number_of_objects import log_new_weights, log_partition
 from atg_fg.learning.raw_trials import Recording
@@ -79,7 +79,9 @@ class Task(NamedTuple):
     @classmethod
     def of(cls, recording: Recording, noise: DetectorNoise, n_objects: int) -> Task:
         """Return the task of sampling with this noise, where there are at most ``n_objects``."""
-        looks = noise.likelihoods(recording.labels, recording.confidences)
+        # A likelihood is taken at its word, but for what no look is ever certain of.
+        soft = MOST_CERTAIN * recording.likelihoods + (1.0 - MOST_CERTAIN)
+        looks = noise.likelihoods(recording.labels, recording.confidences) * soft
         n_trials = len(recording.lengths)
         return cls(
             recording,

@@ -14,7 +14,7 @@ import numpy as np
 
 from atg_fg.core.log_math import log_sum_exp
 from atg_fg.core.patterns import Evidence, FloatArray, IntArray, PatternAlphabet
-from atg_fg.learning.detector_noise import DetectorNoise
+from atg_fg.learning.detector_noise import MOST_CERTAIN, DetectorNoise
 from atg_fg.learning.evidence_learner import BelievedChain
 
 #: Paths less probable than this, whatever the object, are dropped, and so are those beyond this number.
@@ -78,10 +78,13 @@ class PathFilter:
 
     def observe(self, evidence: Evidence) -> None:
         """Take in a look, as labels if it is a detection, else as a likelihood of each slot's symbol."""
-        if evidence.detection is None:
+        if evidence.detection is None and not evidence.slots:
             likelihood = self._alphabet.slot_likelihoods(evidence.likelihood)
         else:
             likelihood = label_likelihoods(self._noise, evidence)
+        for slot, weights in enumerate(evidence.slots):
+            if weights is not None:
+                likelihood[slot] = MOST_CERTAIN * np.array(weights) + (1.0 - MOST_CERTAIN) * np.mean(weights)
         for slot, weights in enumerate(likelihood):
             register = self._chain.registers[self._states[:, -1], slot]
             paths = np.arange(len(register))

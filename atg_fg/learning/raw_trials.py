@@ -4,13 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.core.patterns import MISSING, Confidences, Detection, FloatArray, IntArray, check_confidences
+from atg_fg.core.patterns import (
+    MISSING,
+    Confidences,
+    Detection,
+    Evidence,
+    FloatArray,
+    IntArray,
+    PatternAlphabet,
+    SlotLikelihoods,
+    check_confidences,
+    check_slots,
+    read_only,
+)
 
 
 @dataclass(frozen=True)
@@ -21,11 +33,34 @@ class RawTrial:
         detections: The symbol in each slot at each look, ``None`` where nothing was seen; t + 1 of them.
         actions: Index of the action between each two looks; t of them.
         confidences: How sure the detector was of each symbol at each look, as it was given; empty if it never says.
+        likelihoods: Of the symbols of each slot at each look, as they were given; empty if there are none.
     """
 
     detections: tuple[Detection, ...]
     actions: tuple[int, ...]
     confidences: tuple[Confidences, ...] = ()
+    likelihoods: tuple[SlotLikelihoods, ...] = ()
+
+    @classmethod
+    def of(cls, looks: Sequence[Evidence], actions: Sequence[int], alphabet: PatternAlphabet) -> RawTrial:
+        """Return the trial in which these looks were had between these actions.
+
+        Of evidence that is no detection, and was not given slot by slot, it keeps what that says of each slot alone.
+        """
+        nothing: Detection = (None,) * len(alphabet.slots)
+        likelihoods: list[SlotLikelihoods] = []
+        for look in looks:
+            if look.detection is None and not look.slots:
+                likelihoods.append(tuple(map(tuple, alphabet.slot_likelihoods(look.likelihood).tolist())))
+            else:
+                likelihoods.append(look.slots)
+        confidences = tuple(look.confidences for look in looks)
+        return cls(
+            tuple(look.detection or nothing for look in looks),
+            tuple(actions),
+            confidences if any(confidences) else (),
+            tuple(likelihoods) if any(likelihoods) else (),
+        )
 
     def check(self, assumptions: Assumptions, place: str = "trial") -> None:
         """Raise ``InvalidInputError``, naming ``place``, if this is no trial under these assumptions."""
@@ -41,6 +76,12 @@ class RawTrial:
             )
         for look, confidences in enumerate(self.confidences):
             check_confidences(confidences, len(assumptions.alphabet.slots), f"{place}: look {look}: confidences")
+        if len(self.likelihoods) not in (0, len(self.detections)):
+            raise InvalidInputError(
+                f"{place}: {len(self.likelihoods)} likelihoods; expected one for each of {len(self.detections)} looks"
+            )
+        for look, likelihoods in enumerate(self.likelihoods):
+            check_slots(likelihoods, assumptions.alphabet, f"{place}: look {look}: likelihoods")
         for action in self.actions:
             if not 0 <= action < len(assumptions.actions):
                 raise InvalidInputError(f"{place}: action {action}; expected 0 to {len(assumptions.actions) - 1}")
@@ -78,6 +119,10 @@ def side_by_side(trials: Sequence[RawTrial]) -> TrialArrays:
     return TrialArrays(symbols, actions)
 
 
+#: Likelihoods where all looks are labels.
+NOTHING_SOFT: Final = read_only(np.ones((1, 1, 1, 1)))
+
+
 class Recording(NamedTuple):
     """All raw trials side by side, as they were given.
 
@@ -87,6 +132,8 @@ class Recording(NamedTuple):
         actions: That were asked for after each look, shape [N, T].
         lengths: Number of looks, shape [N].
         n_symbols: V.
+        likelihoods: Of each symbol in each slot at each look, with the mean 1, shape [N, T, J, V]; all 1 where none was
+            given. Of shape [1, 1, 1, 1] if none ever was.
     """
 
     labels: IntArray
@@ -94,6 +141,7 @@ class Recording(NamedTuple):
     actions: IntArray
     lengths: IntArray
     n_symbols: int
+    likelihoods: FloatArray = NOTHING_SOFT
 
     @classmethod
     def of(cls, trials: Sequence[RawTrial], n_symbols: int) -> Recording:
@@ -106,4 +154,16 @@ class Recording(NamedTuple):
                     confidences[number, look] = [np.nan if value is None else value for value in stated]
         actions = np.concatenate((np.maximum(arrays.actions, 0), np.zeros((len(trials), 1), dtype=np.int64)), axis=1)
         lengths = np.array([len(trial.detections) for trial in trials])
-        return cls(arrays.symbols, confidences, actions, lengths, n_symbols)
+        return cls(arrays.symbols, confidences, actions, lengths, n_symbols, _likelihoods(trials, arrays, n_symbols))
+
+
+def _likelihoods(trials: Sequence[RawTrial], arrays: TrialArrays, n_symbols: int) -> FloatArray:
+    if not any(trial.likelihoods for trial in trials):
+        return NOTHING_SOFT
+    result = np.ones((*arrays.symbols.shape, n_symbols))
+    for number, trial in enumerate(trials):
+        for look, slots in enumerate(trial.likelihoods):
+            for slot, weights in enumerate(slots):
+                if weights is not None:
+                    result[number, look, slot] = np.array(weights) * (n_symbols / sum(weights))
+    return result

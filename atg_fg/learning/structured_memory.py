@@ -16,7 +16,7 @@ from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.merging import Merge
 from atg_fg.core.parameters import ModelParameters
-from atg_fg.core.patterns import Confidences, Detection, Evidence
+from atg_fg.core.patterns import Confidences, Detection, Evidence, SlotLikelihoods
 from atg_fg.core.transactions import one_transaction
 from atg_fg.learning.evidence_learner import EvidenceLearner, SavedEvidence
 from atg_fg.learning.learner import StructureLearner
@@ -98,6 +98,7 @@ class StructuredMemory(RobotMemory):
         detections: Sequence[Detection],
         actions: Sequence[int],
         confidences: Sequence[Confidences] = (),
+        likelihoods: Sequence[SlotLikelihoods] = (),
     ) -> str:
         """Keep a raw trial, and learn from it what all objects share; return the name of the ATG that it is of now.
 
@@ -109,12 +110,14 @@ class StructuredMemory(RobotMemory):
             detections: The symbol in each slot at each look, ``None`` where nothing was seen, length t + 1.
             actions: Index of the action between each two, length t.
             confidences: How sure the detector was of each symbol at each look; none if it never says.
+            likelihoods: Of the symbols in each slot at each look, where evidence was no symbol; none if it always was.
+                The model in which looks err learns from the whole of them.
 
         Raises:
             UnknownNameError: There is no such ATG.
             InvalidInputError: It is no trial under these assumptions.
         """
-        trial = RawTrial(tuple(detections), tuple(actions), tuple(confidences))
+        trial = RawTrial(tuple(detections), tuple(actions), tuple(confidences), tuple(likelihoods))
         trial.check(self.assumptions)
         before = self.gain if len(self.learner.trials) >= FIRST_TRIALS else 0.0
         self.learner.learn(self[name].name, trial, search=before < OUTDONE)

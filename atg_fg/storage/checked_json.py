@@ -108,13 +108,15 @@ def without_none(fields: Mapping[str, Any], but_for: Collection[str] = ()) -> di
     return {name: value for name, value in fields.items() if value is not None or name in but_for}
 
 
-def check_format(document: dict[str, Any], name: str, place: str) -> None:
-    """Check the keys ``format`` and ``version`` of a document."""
+def check_format(document: dict[str, Any], name: str, place: str, newest: int = 1) -> int:
+    """Check the keys ``format`` and ``version`` of a document; return the version, from 1 to the newest."""
     if document["format"] != name:
         raise InvalidInputError(f"{place}: format: {brief(document['format'])}; expected {name!r}")
     version = document["version"]
-    if isinstance(version, bool) or version != 1:
-        raise InvalidInputError(f"{place}: version: {brief(version)}; expected 1")
+    if isinstance(version, bool) or version not in range(1, newest + 1):
+        expected = " or ".join(map(str, range(1, newest + 1)))
+        raise InvalidInputError(f"{place}: version: {brief(version)}; expected {expected}")
+    return int(version)
 
 
 @contextmanager

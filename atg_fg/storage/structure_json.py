@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from typing import Any, Final
 
 from atg_fg.core.assumptions import Assumptions
-from atg_fg.core.checks import whole_number
+from atg_fg.core.checks import number, whole_number
 from atg_fg.core.errors import InvalidInputError, TooLargeError
-from atg_fg.core.patterns import check_confidences
+from atg_fg.core.patterns import Detection, SlotLikelihoods, check_confidences, check_slots
 from atg_fg.learning.learner import MAX_CANDIDATES, StructureLearner
 from atg_fg.learning.rates import PRIORS, Rates
 from atg_fg.learning.raw_trials import RawTrial
@@ -30,7 +30,7 @@ def write_learner(learner: StructureLearner, first: int = 0) -> dict[str, Any]:
         "trials": [
             {
                 "object": owner,
-                "observed": [list(detection) for detection in trial.detections],
+                "observed": _write_looks(trial),
                 "actions": [names[action] for action in trial.actions],
                 **({"confidences": [list(each) for each in trial.confidences]} if trial.confidences else {}),
             }
@@ -74,11 +74,10 @@ def _read_trial(value: Any, assumptions: Assumptions, names: Sequence[str], plac
     owner = fields["object"]
     if not isinstance(owner, str) or owner not in names:
         raise InvalidInputError(f"{place}.object: {owner!r}; expected the name of an ATG in this memory")
-    looks = read_list(fields["observed"], f"{place}.observed")
-    detections = tuple(
-        assumptions.alphabet.check_detection(read_list(look, where), where)
-        for look, where in ((look, f"{place}.observed[{index}]") for index, look in enumerate(looks))
-    )
+    looks = [
+        _read_look(look, assumptions, f"{place}.observed[{index}]")
+        for index, look in enumerate(read_list(fields["observed"], f"{place}.observed"))
+    ]
     actions = tuple(
         assumptions.action_index(name, f"{place}.actions[{index}]")
         for index, name in enumerate(read_list(fields["actions"], f"{place}.actions"))
@@ -88,9 +87,35 @@ def _read_trial(value: Any, assumptions: Assumptions, names: Sequence[str], plac
         check_confidences(read_list(look, where), len(assumptions.alphabet.slots), where)
         for look, where in ((look, f"{place}.confidences[{index}]") for index, look in enumerate(stated))
     )
-    trial = RawTrial(detections, actions, confidences)
+    likelihoods = tuple(slots for _, slots in looks)
+    detections = tuple(detection for detection, _ in looks)
+    trial = RawTrial(detections, actions, confidences, likelihoods if any(likelihoods) else ())
     trial.check(assumptions, place)
     return owner, trial
+
+
+def _write_looks(trial: RawTrial) -> list[list[Any]]:
+    """Return what was seen: in each slot a symbol, null, or a list with the likelihood of each symbol."""
+    looks: list[list[Any]] = [list(detection) for detection in trial.detections]
+    for look, slots in zip(looks, trial.likelihoods, strict=False):
+        for slot, weights in enumerate(slots):
+            if weights is not None:
+                look[slot] = list(weights)
+    return looks
+
+
+def _read_look(value: Any, assumptions: Assumptions, place: str) -> tuple[Detection, SlotLikelihoods]:
+    entries = read_list(value, place)
+    labels = [None if isinstance(entry, list) else entry for entry in entries]
+    detection = assumptions.alphabet.check_detection(labels, place)
+    if not any(isinstance(entry, list) for entry in entries):
+        return detection, ()
+    for slot, entry in zip(assumptions.alphabet.slots, entries, strict=True):
+        if isinstance(entry, list):
+            for weight in entry:
+                number(weight, f"{place}, slot {slot!r}", 0.0)
+    weights = [entry if isinstance(entry, list) else None for entry in entries]
+    return detection, check_slots(weights, assumptions.alphabet, place)
 
 
 #: Hidden registers that a file may name; far above what can be learned.
