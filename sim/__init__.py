@@ -21,6 +21,15 @@ def make_rendered_arcube(**options: Any) -> gymnasium.Env[Any, Any]:
     return RenderedARcubeWorld(**options)
 
 
+def make_picture_box(**options: Any) -> gymnasium.Env[Any, Any]:
+    """Return a ``sim.worlds.picture_box_world.PictureBoxWorld``; its module is imported only now."""
+    require_simulator()
+    import_quietly("pybullet")
+    from sim.worlds.picture_box_world import PictureBoxWorld
+
+    return PictureBoxWorld(**options)
+
+
 def make_robonaut_arcube(**options: Any) -> gymnasium.Env[Any, Any]:
     """Return a ``sim.worlds.robonaut_world.RobonautARcubeWorld``; its module is imported only now."""
     from sim.worlds.robonaut_world import RobonautARcubeWorld
@@ -36,6 +45,9 @@ def make_robonaut_table(**options: Any) -> gymnasium.Env[Any, Any]:
 
 
 gymnasium.register(id="sim/RenderedARcube-v0", entry_point="sim:make_rendered_arcube")
+
+
+gymnasium.register(id="sim/PictureBox-v0", entry_point="sim:make_picture_box")
 
 
 gymnasium.register(id="sim/RobonautARcube-v0", entry_point="sim:make_robonaut_arcube")

@@ -32,7 +32,7 @@ from atg_fg.storage.memory_files import load_memory, open_memory, save_trial
 from atg_fg.storage.presets import preset as preset_named
 from atg_fg.storage.scripted_trial import read_script
 from atg_fg.storage.trial_record import to_json_lines
-from atg_fg.worlds.registry import assumptions_of, make_world_with
+from atg_fg.worlds.registry import assumptions_of, make_world_with, sense_of
 
 #: Objects of the world that ``atg-fg trial`` makes, |O|.
 N_OBJECTS: Final = 100
@@ -91,7 +91,7 @@ def trial(
         if kept is not None:
             stack.callback(kept.close)
         made_world = stack.enter_context(closing(make_world_with(world, N_OBJECTS, cubes_seed, **world_options)))
-        empty = RobotMemory(assumptions_of(made_world, N_OBJECTS))
+        empty = RobotMemory(assumptions_of(made_world, N_OBJECTS), sense=sense_of(made_world))
         remembered = stack.enter_context(memory_for(parameters, empty if kept is None else kept))
         inference = begin_trial(engine, remembered, parameters)
         story = Story(options.console(json_file), remembered)

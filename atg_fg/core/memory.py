@@ -9,7 +9,8 @@ from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.merging import Merge, check_merges
-from atg_fg.core.patterns import Confidences, Detection, SlotLikelihoods
+from atg_fg.core.patterns import Confidences, Detection, Evidence, SlotLikelihoods
+from atg_fg.core.sense import Readings, Sense, SensedTrial
 from atg_fg.core.table import Bar, Cell, Table
 from atg_fg.core.transactions import Persistent, one_transaction
 
@@ -21,9 +22,13 @@ class RobotMemory(Persistent):
         assumptions: |O|, |G|, actions and alphabet.
         graphs: ATGs under the same assumptions, with unique names.
         merges: Those that led to these graphs, in their order.
+        sense: What reads the observations that these graphs were made from; ``None`` if they are symbols themselves.
 
     Raises:
         InvalidInputError: A repeated name, a graph made under other assumptions, or merges that lead to others.
+
+    Attributes:
+        sense: As given; it learns with the memory.
     """
 
     def __init__(
@@ -31,8 +36,10 @@ class RobotMemory(Persistent):
         assumptions: Assumptions,
         graphs: Iterable[AspectTransitionGraph] = (),
         merges: Iterable[Merge] = (),
+        sense: Sense | None = None,
     ) -> None:
         self.assumptions = assumptions
+        self.sense = sense
         self._graphs: dict[str, AspectTransitionGraph] = {}
         self._merges: list[Merge] = []
         for graph in graphs:
@@ -103,6 +110,59 @@ class RobotMemory(Persistent):
             likelihoods: Of the symbols in each slot at each look, where evidence was no symbol; none if it always was.
         """
         return name
+
+    @one_transaction
+    def learn_readings(
+        self, name: str, readings: Sequence[Readings], detections: Sequence[Detection], actions: Sequence[int]
+    ) -> None:
+        """Let the sense learn from what was measured in a trial.
+
+        Where all readings were looked at again, and some are taken for the look of another class now, the ATGs that
+        were made from such trials alone are estimated again.
+
+        Args:
+            name: Name of the ATG that the trial went to.
+            readings: Of each look, length t + 1.
+            detections: What they were taken for.
+            actions: Index of the action between each two, length t.
+
+        Raises:
+            InvalidInputError: This memory has no sense, or one of other readings.
+        """
+        if self.sense is None:
+            raise InvalidInputError("learn: readings for a memory without a sense; expected one that has it")
+        sense = self.sense.copy()  # nothing is half learned if there is an error
+        before = [*self.sense.trials, SensedTrial(self[name].name, tuple(readings), tuple(detections), tuple(actions))]
+        changed = sense.learn(before[-1])
+        self.sense = sense
+        if changed is not None:
+            self._take_for(before, changed)
+
+    def _take_for(self, before: Sequence[SensedTrial], detections: Sequence[tuple[Detection, ...]]) -> None:
+        """Take the looks of all trials for what they show now; ``before`` says what they were taken for."""
+        owners = self._owners_of(before)
+        for name in dict.fromkeys(owners):
+            own = [number for number, owner in enumerate(owners) if owner == name]
+            trials = [(before[number].detections, detections[number], before[number].actions) for number in own]
+            touched = any(old != new for old, new, _ in trials)
+            if (
+                touched
+                and name in self._graphs
+                and self._graphs[name] == self._made_of(name, [(old, actions) for old, _, actions in trials])
+            ):
+                self._graphs[name] = self._made_of(name, [(new, actions) for _, new, actions in trials])
+
+    def _owners_of(self, trials: Sequence[SensedTrial]) -> list[str]:
+        """Return the name of the ATG that each trial is of."""
+        return [trial.owner for trial in trials]
+
+    def _made_of(self, name: str, trials: Iterable[tuple[Sequence[Detection], Sequence[int]]]) -> AspectTransitionGraph:
+        """Return the ATG that detections and actions of some trials make."""
+        graph = AspectTransitionGraph(name, self.assumptions)
+        for detections, actions in trials:
+            patterns = [Evidence.of_detection(self.assumptions.alphabet, each).pattern for each in detections]
+            graph.learn(patterns, list(actions))
+        return graph
 
     def _new_name(self) -> str:
         number = len(self)
@@ -179,11 +239,14 @@ class RobotMemory(Persistent):
 
     def become(self, other: RobotMemory) -> None:
         """Have the ATGs and merges of another memory, under the same assumptions, instead of one's own."""
-        self._graphs, self._merges = dict(other._graphs), list(other._merges)
+        self._graphs, self._merges, self.sense = dict(other._graphs), list(other._merges), other.sense
 
     def copy(self) -> RobotMemory:
         """Return a memory that can learn without touching this one."""
-        return RobotMemory(self.assumptions, (graph.copy() for graph in self), self._merges)
+        return RobotMemory(self.assumptions, (graph.copy() for graph in self), self._merges, self._sense_copied())
+
+    def _sense_copied(self) -> Sense | None:
+        return None if self.sense is None else self.sense.copy()
 
     def __getitem__(self, name: str) -> AspectTransitionGraph:
         try:
@@ -201,7 +264,8 @@ class RobotMemory(Persistent):
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, RobotMemory):
             return NotImplemented
-        return (self.assumptions, list(self), self.merges) == (other.assumptions, list(other), other.merges)
+        ours, theirs = ((each.assumptions, list(each), each.merges, each.sense) for each in (self, other))
+        return ours == theirs
 
     __hash__ = None  # type: ignore[assignment]
 

@@ -16,17 +16,16 @@ from numpy.typing import NDArray
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
-from atg_fg.core.patterns import Evidence
 from atg_fg.core.records import TrialRecord, TrialStep, TrialSummary
 from atg_fg.engines import begin_trial, check_engine
 from atg_fg.experiments.scores import Score
-from atg_fg.experiments.trial import check_world, learn_from
+from atg_fg.experiments.trial import check_world, learn_from, sensed_look
 from atg_fg.inference.interface import Inference
 from atg_fg.learning.structured_memory import memory_for
 from atg_fg.policies.belief_features import BeliefFeatures
 from atg_fg.storage.presets import preset as preset_named
-from atg_fg.worlds.base import World, detection_of
-from atg_fg.worlds.registry import assumptions_of, make_world_with
+from atg_fg.worlds.base import World
+from atg_fg.worlds.registry import assumptions_of, make_world_with, sense_of
 
 Summary: TypeAlias = NDArray[np.float32]
 
@@ -98,7 +97,7 @@ class RecognitionEnv(gymnasium.Env[Summary, np.int64]):
                 f"made_from: {', '.join(self._made_from) or 'nothing'}; expected the object of each of "
                 f"the {len(memory)} ATGs in memory"
             )
-        check_world(world, memory.assumptions)
+        check_world(world, memory.assumptions, memory.sense)
         self.world, self.parameters, self.engine = world, parameters, engine
         self.n_actions, self.reward, self.learns, self.n_trials = n_actions, reward, learns, n_trials
         self.summary = summary or BeliefFeatures(memory.assumptions)
@@ -126,8 +125,8 @@ class RecognitionEnv(gymnasium.Env[Summary, np.int64]):
         self._inference = begin_trial(self.engine, self.memory, self.parameters)
         self._record = TrialRecord(self.memory.names, self.memory.assumptions)
         observation, truth = self.world.reset(seed=int(self.np_random.integers(2**31)), options=options)
-        self._look(self._inference, observation)
-        self._truth = truth
+        self._senses = None if self.memory.sense is None else self.memory.sense.begin()
+        self._look(self._inference, observation, truth)
         self._entropy = self._inference.identity().entropy
         self._seen = self.summary.of(self._inference)
         return self._seen, dict(truth)
@@ -150,7 +149,7 @@ class RecognitionEnv(gymnasium.Env[Summary, np.int64]):
         if truth.get("lost"):
             self._record.lost_truth = truth
             return self._end(0.0)
-        self._look(inference, observation)
+        self._look(inference, observation, truth)
         self._seen = self.summary.of(inference)
         before, self._entropy = self._entropy, inference.identity().entropy
         gain = before - self._entropy
@@ -159,15 +158,15 @@ class RecognitionEnv(gymnasium.Env[Summary, np.int64]):
             return self._end(gain)
         return self._seen, gain if self.reward == "entropy" else 0.0, False, False, dict(truth)
 
-    def _look(self, inference: Inference, observation: Any) -> None:
-        self._detection = detection_of(observation)
-        self._evidence = Evidence.of_detection(self.memory.assumptions.alphabet, self._detection)
+    def _look(self, inference: Inference, observation: Any, truth: dict[str, Any]) -> None:
+        self._evidence, self._truth = sensed_look(self._senses, self.memory.assumptions, observation, truth)
         inference.observe(self._evidence)
 
     def _keep(self, inference: Inference, action: int | None) -> None:
         """Add the last look to the record, and the action chosen after it."""
         pattern, belief = self._evidence.pattern, inference.identity()
-        step = TrialStep(self._detection, pattern, belief, inference.log_evidence, self._truth, action=action)
+        detection = self._evidence.detection or ()
+        step = TrialStep(detection, pattern, belief, inference.log_evidence, self._truth, action=action)
         self._record.steps.append(step)
 
     def _end(self, gain: float) -> tuple[Summary, float, bool, bool, dict[str, Any]]:
@@ -210,4 +209,5 @@ def make_recognition_env(
         InvalidInputError: As for ``RecognitionEnv``.
     """
     made = make_world_with(world, n_objects, objects_seed, **dict(world_options or {}))
-    return RecognitionEnv(made, RobotMemory(assumptions_of(made, n_objects)), preset_named(preset), **options)
+    memory = RobotMemory(assumptions_of(made, n_objects), sense=sense_of(made))
+    return RecognitionEnv(made, memory, preset_named(preset), **options)

@@ -33,7 +33,7 @@ from atg_fg.storage.memory_files import goes_to_database, save_memory
 from atg_fg.storage.plain_files import make_folder
 from atg_fg.storage.trial_log import TrialLog
 from atg_fg.worlds.base import World
-from atg_fg.worlds.registry import assumptions_of, make_world_with
+from atg_fg.worlds.registry import assumptions_of, make_world_with, sense_of
 
 
 @dataclass(frozen=True)
@@ -114,7 +114,8 @@ def run_test(
     policy = make_policy(plan.policy, plan.settled) if policy is None else policy
     score = Score()
     with closing(plan.make_world(int(objects_seed.generate_state(1)[0]))) as world:
-        memory = memory_for(plan.parameters, RobotMemory(assumptions_of(world, plan.n_objects)))
+        empty = RobotMemory(assumptions_of(world, plan.n_objects), sense=sense_of(world))
+        memory = memory_for(plan.parameters, empty)
         log = _open_log(plan, seed, records, memory)
         if log is not None:
             for trial in log.resume() if resume else log.begin():

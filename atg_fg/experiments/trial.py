@@ -12,19 +12,30 @@ from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.patterns import Evidence
 from atg_fg.core.records import TrialRecord, TrialStep, TrialSummary, confidences_in
+from atg_fg.core.sense import Sense, SenseTrial, readings_of
 from atg_fg.inference.interface import Inference
 from atg_fg.policies import Policy
 from atg_fg.worlds.base import World, detection_of
-from atg_fg.worlds.registry import assumptions_of
+from atg_fg.worlds.registry import assumptions_of, sense_of
 
 
-def check_world(world: World, assumptions: Assumptions) -> None:
-    """Raise ``InvalidInputError`` if a world's spaces, or the assumptions it states, do not fit the assumptions."""
-    expected = (
-        len(assumptions.actions),
-        [assumptions.alphabet.n_symbols + 1] * len(assumptions.alphabet.slots),
-    )
+def check_world(world: World, assumptions: Assumptions, sense: Sense | None = None) -> None:
+    """Raise ``InvalidInputError`` if a world does not fit what a memory takes for granted.
+
+    Args:
+        world: Its spaces, its sense, and the assumptions that it states are looked at.
+        assumptions: Of the memory.
+        sense: Of the memory.
+    """
+    of_world = sense_of(world)
+    if of_world is not None and of_world.features != (None if sense is None else sense.features):
+        have = "without a sense" if sense is None else f"of {sense.features!r}"
+        raise InvalidInputError(f"world: features {of_world.features!r}, memory {have}; expected the same features")
+    symbols = [assumptions.alphabet.n_symbols + 1] * len(assumptions.alphabet.slots)
+    expected = (len(assumptions.actions), symbols if sense is None else [])
     found = (getattr(world.action_space, "n", None), list(getattr(world.observation_space, "nvec", [])))
+    if sense is not None:
+        sense.check_space(world.observation_space)
     if (int(found[0] or 0), [int(size) for size in found[1]]) != expected:
         raise InvalidInputError(
             f"world: {world.action_space} and {world.observation_space}; expected {expected[0]} actions and "
@@ -37,6 +48,23 @@ def check_world(world: World, assumptions: Assumptions) -> None:
     ):
         if ours != theirs:
             raise InvalidInputError(f"world: {place} {', '.join(theirs)}; expected those remembered: {', '.join(ours)}")
+
+
+def sensed_look(
+    senses: SenseTrial | None, assumptions: Assumptions, observation: Any, info: dict[str, Any]
+) -> tuple[Evidence, dict[str, Any]]:
+    """Return the evidence of an observation, and ``info`` with what the sense makes of it.
+
+    Args:
+        senses: Reads the observation; ``None`` if it is symbols.
+        assumptions: Of the memory.
+        observation: Of the world.
+        info: That came with it.
+    """
+    if senses is None:
+        return Evidence.of_detection(assumptions.alphabet, detection_of(observation), confidences_in(info)), info
+    evidence, readings = senses.look(observation)
+    return evidence, {**info, "confidences": evidence.confidences, "readings": readings}
 
 
 def run_trial(
@@ -66,18 +94,18 @@ def run_trial(
     assumptions = inference.memory.assumptions
     if n_actions < 1:
         raise InvalidInputError(f"actions: {n_actions}; expected a whole number of at least 1")
-    check_world(world, assumptions)
+    check_world(world, assumptions, inference.memory.sense)
+    senses = None if inference.memory.sense is None else inference.memory.sense.begin()
     record = TrialRecord(inference.memory.names, assumptions)
     observation, truth = world.reset(seed=int(rng.integers(2**31)), options=reset_options)
     remaining = n_actions
     while True:
-        detection = detection_of(observation)
-        evidence = Evidence.of_detection(assumptions.alphabet, detection, confidences_in(truth))
+        evidence, truth = sensed_look(senses, assumptions, observation, truth)
         inference.observe(evidence)
         choice = policy.choose(inference, rng) if remaining else None
         ends = choice is None or choice.action is None
         step = TrialStep(
-            detection,
+            evidence.detection or (None,) * len(assumptions.alphabet.slots),
             evidence.pattern,
             inference.conclude() if ends else inference.identity(),
             inference.log_evidence,
@@ -112,6 +140,9 @@ def learn_from(record: TrialRecord | TrialSummary, memory: RobotMemory) -> str |
             actions = [memory.assumptions.action_index(action) for action in trial.actions[: len(trial.steps) - 1]]
             name = memory.learn(list(trial.patterns), actions, trial.matched)
             name = memory.learn_shared(name, trial.detections, actions, trial.confidences)
+            readings = readings_of([step.truth for step in trial.steps])
+            if readings and memory.sense is not None:
+                memory.learn_readings(name, readings, trial.detections, actions)
         if isinstance(record, TrialRecord):
             memory.add_record(record, name)
     return name

@@ -166,6 +166,13 @@ class StructureLearner:
         for candidate in self._candidates:
             candidate.rescore(self.trials, self._owner_indices, self.rates)
 
+    def take_for(self, trials: Sequence[RawTrial]) -> None:
+        """Take what was seen in all raw trials for something else, of the same objects, and score structures anew."""
+        self.trials[:] = trials
+        self._plain = [plain_log_evidence(trial, self.assumptions) for trial in self.trials]
+        for candidate in self._candidates:
+            candidate.rescore(self.trials, self._owner_indices, self.rates)
+
     def same_as(self, other: StructureLearner) -> bool:
         """Return whether both learned the same from the same trials."""
         known, others = ((each.trials, each.owners, each.candidates, each.rates, each.seed) for each in (self, other))

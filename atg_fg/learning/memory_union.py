@@ -10,6 +10,7 @@ from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.merging import Merge
+from atg_fg.core.sense import Sense
 from atg_fg.learning.learner import StructureLearner
 from atg_fg.learning.raw_trials import RawTrial
 from atg_fg.learning.structured_memory import StructuredMemory
@@ -70,12 +71,14 @@ def unite(first: RobotMemory, second: RobotMemory) -> Union:
     both.
 
     Raises:
-        InvalidInputError: The memories were made under different assumptions.
+        InvalidInputError: The memories were made under different assumptions, or have senses of which neither is the
+            other one that went on learning.
     """
     if first.assumptions != second.assumptions:
         raise InvalidInputError(
             f"merge: {first.assumptions} and {second.assumptions}; expected two memories under the same assumptions"
         )
+    sense = _united_sense(first.sense, second.sense)
     same = [name for name in second.names if name in first.names and _is_one(first[name], second[name])]
     further = [name for name in same if not holds(first[name], second[name])]
     one = _Part(first, [name for name in first.names if name not in further])
@@ -92,11 +95,29 @@ def unite(first: RobotMemory, second: RobotMemory) -> Union:
     learner = _united_learner(one, two, same)
     merges = [part.merge_in_union(merge) for part in (one, two) for merge in part.merges]
     if learner is None:
-        memory = RobotMemory(first.assumptions, graphs, merges)
+        memory = RobotMemory(first.assumptions, graphs, merges, sense)
     else:
-        memory = StructuredMemory(first.assumptions, graphs, learner, merges)
+        memory = StructuredMemory(first.assumptions, graphs, learner, merges, sense)
     renamed = {old: new for old, new in two.called.items() if old != new}
     return Union(memory, renamed, tuple(same))
+
+
+def _united_sense(first: Sense | None, second: Sense | None) -> Sense | None:
+    """Return the sense of two that knows all that both know.
+
+    Classes that were found apart have numbers of their own, which mean nothing to the other memory.
+    """
+    if first is None and second is None:
+        return None
+    features = ["none" if each is None else repr(each.features) for each in (first, second)]
+    if first is None or second is None or first.features != second.features:
+        raise InvalidInputError(f"merge: features {' and '.join(features)}; expected two memories of the same features")
+    less, more = sorted((first, second), key=lambda sense: len(sense.trials))
+    if more.trials[: len(less.trials)] != less.trials:
+        raise InvalidInputError(
+            "merge: classes of appearance that were found apart; expected a memory and a copy that went on learning"
+        )
+    return more.copy()
 
 
 def holds(more: AspectTransitionGraph, less: AspectTransitionGraph) -> bool:

@@ -16,7 +16,8 @@ from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.merging import Merge
 from atg_fg.core.parameters import ModelParameters
-from atg_fg.core.patterns import Confidences, Detection, Evidence, SlotLikelihoods
+from atg_fg.core.patterns import Confidences, Detection, SlotLikelihoods
+from atg_fg.core.sense import Sense, SensedTrial
 from atg_fg.core.transactions import one_transaction
 from atg_fg.learning.evidence_learner import EvidenceLearner, SavedEvidence
 from atg_fg.learning.learner import StructureLearner
@@ -55,6 +56,7 @@ class StructuredMemory(RobotMemory):
         graphs: ATGs under the same assumptions, with unique names.
         learner: Its trials are of these ATGs; one that knows nothing yet if not given.
         merges: Those that led to these graphs, in their order.
+        sense: As for ``RobotMemory``.
 
     Raises:
         InvalidInputError: A repeated name, a graph made under other assumptions, merges that lead to others, or that
@@ -70,8 +72,9 @@ class StructuredMemory(RobotMemory):
         graphs: Iterable[AspectTransitionGraph] = (),
         learner: StructureLearner | None = None,
         merges: Iterable[Merge] = (),
+        sense: Sense | None = None,
     ) -> None:
-        super().__init__(assumptions, graphs, merges)
+        super().__init__(assumptions, graphs, merges, sense)
         self.learner = learner or StructureLearner(assumptions)
         self._reassignments: list[Reassignment] = []
         n_trials = len(self.learner.trials)
@@ -184,12 +187,22 @@ class StructuredMemory(RobotMemory):
 
     def _estimated(self, name: str) -> AspectTransitionGraph:
         """Return the ATG that the raw trials of a name make."""
-        graph = AspectTransitionGraph(name, self.assumptions)
-        for trial, owner in zip(self.learner.trials, self.learner.owners, strict=True):
-            if owner == name:
-                patterns = [Evidence.of_detection(self.assumptions.alphabet, each).pattern for each in trial.detections]
-                graph.learn(patterns, list(trial.actions))
-        return graph
+        trials = zip(self.learner.trials, self.learner.owners, strict=True)
+        return self._made_of(name, ((trial.detections, trial.actions) for trial, owner in trials if owner == name))
+
+    def _owners_of(self, trials: Sequence[SensedTrial]) -> list[str]:
+        """Return the name of the ATG that each trial is of: raw trials may have changed hands."""
+        return [*super()._owners_of(trials)[: -len(self.learner.owners)], *self.learner.owners]
+
+    def _take_for(self, before: Sequence[SensedTrial], detections: Sequence[tuple[Detection, ...]]) -> None:
+        super()._take_for(before, detections)
+        # Raw trials are the last ones: those of before the memory had a structure to learn are the sense's alone.
+        raw = [
+            RawTrial(taken, trial.actions, trial.confidences)
+            for taken, trial in zip(detections[-len(self.learner.trials) :], self.learner.trials, strict=True)
+        ]
+        self.learner.take_for(raw)
+        self.evidence.forget_verdict()
 
     def _mend(self) -> None:
         """Give raw trials to the ATGs that what was sampled says; a name stays with what most of its looks are of."""
@@ -261,7 +274,8 @@ class StructuredMemory(RobotMemory):
     def copy(self) -> StructuredMemory:
         """Return a memory that can learn without touching this one."""
         graphs = (graph.copy() for graph in self)
-        twin = StructuredMemory(self.assumptions, graphs, copy.deepcopy(self.learner), self.merges)
+        sense = self._sense_copied()
+        twin = StructuredMemory(self.assumptions, graphs, copy.deepcopy(self.learner), self.merges, sense)
         twin.evidence, twin._gain = self.evidence.copy(twin.learner), self._gain
         twin._reassignments = list(self._reassignments)
         return twin
@@ -298,7 +312,7 @@ def memory_for(parameters: ModelParameters, memory: RobotMemory) -> RobotMemory:
     If ``memory`` is kept in a file, it is the new one that is kept there from here on.
     """
     if parameters.learn_structure and not isinstance(memory, StructuredMemory):
-        structured = StructuredMemory(memory.assumptions, memory, merges=memory.merges)
+        structured = StructuredMemory(memory.assumptions, memory, merges=memory.merges, sense=memory.sense)
         structured._keeper, memory._keeper = memory._keeper, None
         return structured
     return memory

@@ -14,6 +14,7 @@ from atg_fg.core.patterns import PatternAlphabet
 from atg_fg.learning.structured_memory import StructuredMemory
 from atg_fg.storage.checked_json import check_format, parse_json, placed, read_list, read_object
 from atg_fg.storage.evidence_json import read_evidence, write_evidence
+from atg_fg.storage.sense_json import read_sense, write_sense
 from atg_fg.storage.structure_json import read_learner, write_learner
 
 MEMORY_FORMAT: Final = "atg-fg/memory"
@@ -39,6 +40,8 @@ def memory_to_document(memory: RobotMemory) -> dict[str, Any]:
     }
     if memory.merges:
         document["merges"] = [write_merge(merge) for merge in memory.merges]
+    if memory.sense is not None:
+        document["sense"] = write_sense(memory.sense, memory.assumptions)
     if isinstance(memory, StructuredMemory):
         document["structure"] = write_learner(memory.learner)
         evidence = write_evidence(memory)
@@ -54,19 +57,20 @@ def memory_from_document(value: Any, place: str = "memory") -> RobotMemory:
         InvalidInputError: Anything in it is not as it should be.
     """
     keys = ("format", "version", "assumptions", "memory")
-    document = read_object(value, place, keys, optional=("merges", "structure"))
+    document = read_object(value, place, keys, optional=("merges", "structure", "sense"))
     check_format(document, MEMORY_FORMAT, place)
     assumptions = read_assumptions(document["assumptions"], f"{place}: assumptions")
     memory = read_memory(document["memory"], assumptions, f"{place}: memory")
     entries = read_list(document.get("merges", []), f"{place}: merges")
     merges = [_read_merge(entry, assumptions, f"{place}: merges[{index}]") for index, entry in enumerate(entries)]
+    sense = read_sense(document["sense"], assumptions, f"{place}: sense") if "sense" in document else None
     learner = None
     if "structure" in document:
         learner = read_learner(document["structure"], assumptions, memory.names, f"{place}: structure")
     with placed(place):
         if learner is None:
-            return RobotMemory(assumptions, memory, merges)
-        result = StructuredMemory(assumptions, memory, learner, merges)
+            return RobotMemory(assumptions, memory, merges, sense)
+        result = StructuredMemory(assumptions, memory, learner, merges, sense)
     if "evidence" in document["structure"]:
         read_evidence(document["structure"]["evidence"], result, f"{place}: structure.evidence")
     return result

@@ -57,7 +57,9 @@ def read_header(
     if world not in WORLDS:
         return parameters, assumptions
     try:
-        with closing(make_world(world, n_objects=_FEW, objects_seed=0, **options)) as made:
+        # What makes features may be code of a user's own, which no file may name; nothing here depends on it.
+        known = {name: value for name, value in options.items() if name != "features"}
+        with closing(make_world(world, n_objects=_FEW, objects_seed=0, **known)) as made:
             return parameters, replace(assumptions_of(made, n_objects), n_objects=n_objects)
     except (AtgError, TypeError, ValueError, AssertionError) as error:  # the last two are of Gymnasium's own options
         raise InvalidInputError(f"{place}: world_options: {error}; expected those of world {world!r}") from error

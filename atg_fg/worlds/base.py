@@ -65,7 +65,7 @@ class FiniteStateWorld(gymnasium.Env[IntArray, np.int64], ABC):
         self.missing = probability_option("missing", missing)
         self.render_mode = render_mode
         self.action_space = spaces.Discrete(n_actions)
-        self.observation_space = spaces.MultiDiscrete([n_symbols + 1] * n_slots, start=[MISSING] * n_slots)
+        self.observation_space: Any = spaces.MultiDiscrete([n_symbols + 1] * n_slots, start=[MISSING] * n_slots)
         self.object = 0
         self.state = 0
         self._n_objects, self._n_actions = n_objects, n_actions
@@ -121,8 +121,8 @@ class FiniteStateWorld(gymnasium.Env[IntArray, np.int64], ABC):
     def _place(self) -> None:
         """Put the object down in its new state (a hook for worlds that have a place to put it)."""
 
-    def _look(self) -> IntArray:
-        """Return what is detected now, shape [slots]."""
+    def _look(self) -> Any:
+        """Return what is detected now, shape [slots], or what else the observation space says."""
         observation = np.array(self._detect(), dtype=np.int64)
         if self.wrong and self.np_random.random() < self.wrong:
             observation = self.np_random.permutation(self._n_symbols)[: self._n_slots].astype(np.int64)

@@ -1,7 +1,8 @@
 """Worlds by name.
 
 A world has a ``Discrete`` action space and a ``MultiDiscrete`` observation space with one entry a slot:
-the symbol detected there, or ``MISSING``. ``info`` carries the truth, for scoring only.
+the symbol detected there, or ``MISSING``. One with a ``sense`` has the observations that this reads. ``info`` carries
+the truth, for scoring only.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import gymnasium
 
 from atg_fg.core.assumptions import Assumptions, arcube_assumptions
 from atg_fg.core.errors import AtgError, InvalidInputError, unknown_name
+from atg_fg.core.sense import Sense
 from atg_fg.worlds.arcube import make_arcubes
 from atg_fg.worlds.base import World
 
@@ -21,6 +23,7 @@ WORLDS: Final[dict[str, str]] = {
     "ideal": "atg_fg.worlds:atg_fg/ARcube-v0",
     "rendered": "sim:sim/RenderedARcube-v0",
     "robonaut": "sim:sim/RobonautARcube-v0",
+    "picture-box": "sim:sim/PictureBox-v0",
     "prism": "atg_fg.worlds:atg_fg/HexagonalPrism-v0",
     "lock": "atg_fg.worlds:atg_fg/RingLock-v0",
     "lid-box": "atg_fg.worlds:atg_fg/LidBox-v0",
@@ -104,6 +107,17 @@ def assumptions_of(world: World, n_objects: int) -> Assumptions:
     if not isinstance(found, Assumptions):
         raise InvalidInputError(f"world's assumptions: {found!r}; expected an atg_fg.Assumptions")
     return found
+
+
+def sense_of(world: World) -> Sense | None:
+    """Return a sense that reads a world's observations and has learned nothing; ``None`` if they are symbols.
+
+    It is a copy of the world's attribute ``sense``, if it has one.
+    """
+    if not world.has_wrapper_attr("sense"):
+        return None
+    sense: Sense = world.get_wrapper_attr("sense")
+    return sense.copy()
 
 
 def check_arcube_world(role: str, name: str) -> None:

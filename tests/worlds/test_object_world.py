@@ -25,7 +25,7 @@ from atg_fg.worlds.registry import (
 )
 from tests.small import one_slot
 
-OBJECT_WORLDS = [name for name in WORLDS if name not in ARCUBE_WORLDS]
+OBJECT_WORLDS = [name for name, place in WORLDS.items() if place.startswith("atg_fg") and name not in ARCUBE_WORLDS]
 NOISE = {"slip": 0.2, "wrong": 0.2, "missing": 0.3}
 N_STEPS = 2000
 

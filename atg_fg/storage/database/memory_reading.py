@@ -87,6 +87,9 @@ def _document(connection: sqlite3.Connection, place: str) -> dict[str, Any]:
     structure = connection.execute("SELECT document FROM structure").fetchone()
     if structure is not None:
         document["structure"] = _structure(connection, structure[0], graphs, f"{place}: structure")
+    sense = connection.execute("SELECT document FROM sense").fetchone()
+    if sense is not None:
+        document["sense"] = _sense(connection, sense[0], f"{place}: sense")
     return document
 
 
@@ -134,6 +137,17 @@ def _structure(
         if confidences is not None:
             trials[-1]["confidences"] = _json(confidences, where)
     return {**section, "trials": trials}
+
+
+def _sense(connection: sqlite3.Connection, text: Any, place: str) -> dict[str, Any]:
+    keys = ("features", "mean", "projection", "between", "within", "concentration")
+    trials: list[Any] = []
+    for number, document in connection.execute("SELECT number, document FROM sensed_trials ORDER BY number"):
+        where = f"{place}.trials[{len(trials)}]"
+        if whole_number(number, where, least=0) != len(trials):
+            raise InvalidInputError(f"{where}: number {number}; expected {len(trials)}")
+        trials.append(_json(document, where))
+    return {**read_object(_json(text, place), place, keys), "trials": trials}
 
 
 def _of(graphs: dict[Any, dict[str, Any]], graph: Any, place: str) -> dict[str, Any]:

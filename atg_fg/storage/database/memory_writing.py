@@ -11,9 +11,12 @@ from typing import Any
 from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.merging import Merge
+from atg_fg.core.sense import SensedTrial
+from atg_fg.learning.raw_trials import RawTrial
 from atg_fg.learning.structured_memory import StructuredMemory
 from atg_fg.storage.evidence_json import write_evidence
 from atg_fg.storage.memory_json import write_merge
+from atg_fg.storage.sense_json import write_sense
 from atg_fg.storage.structure_json import write_learner
 
 
@@ -30,6 +33,8 @@ class Held:
         positions: The place of each in the order, ascending.
         merges: All of them.
         owners: Name of the object of each raw trial.
+        raw: All raw trials.
+        sensed: All trials of the sense.
     """
 
     graphs: dict[str, AspectTransitionGraph] = field(default_factory=dict)
@@ -37,6 +42,8 @@ class Held:
     positions: dict[str, int] = field(default_factory=dict)
     merges: tuple[Merge, ...] = ()
     owners: tuple[str, ...] = ()
+    raw: tuple[RawTrial, ...] = ()
+    sensed: tuple[SensedTrial, ...] = ()
 
 
 def held_by(connection: sqlite3.Connection, memory: RobotMemory) -> Held:
@@ -48,6 +55,8 @@ def held_by(connection: sqlite3.Connection, memory: RobotMemory) -> Held:
         {name: position for name, _, position in rows},
         memory.merges,
         _owners(memory),
+        _raw(memory),
+        _sensed(memory),
     )
 
 
@@ -55,7 +64,7 @@ def replace_memory(connection: sqlite3.Connection, memory: RobotMemory) -> Held:
     """Write a whole memory in place of what is there; records of trials stay. Inside of a transaction."""
     changed = _assumptions_differ(connection, memory)
     tables = ("raw_trials", "structure", "merges", "transitions", "aspects", "graphs", "actions", "slots")
-    for table in (*tables, "assumptions"):
+    for table in ("sensed_trials", "sense", *tables, "assumptions"):
         connection.execute(f"DELETE FROM {table}")
     assumptions = memory.assumptions
     if changed:
@@ -102,8 +111,9 @@ def write_changes(connection: sqlite3.Connection, memory: RobotMemory, held: Hel
     merges = _write_merges(connection, memory.merges, held.merges)
     owners = _owners(memory)
     if isinstance(memory, StructuredMemory):
-        _write_structure(connection, memory, owners, held.owners, ids)
-    return Held(graphs, ids, positions, merges, owners)
+        _write_structure(connection, memory, owners, held, ids)
+    _write_sense(connection, memory, held.sensed)
+    return Held(graphs, ids, positions, merges, owners, _raw(memory), _sensed(memory))
 
 
 def _placed(connection: sqlite3.Connection, names: Sequence[str], held: Held) -> tuple[dict[str, int], dict[str, int]]:
@@ -156,10 +166,11 @@ def _write_structure(
     connection: sqlite3.Connection,
     memory: StructuredMemory,
     owners: tuple[str, ...],
-    held: tuple[str, ...],
+    before: Held,
     ids: dict[str, int],
 ) -> None:
-    """Write the structures in question anew, raw trials that are new, and the owner of those that changed hands."""
+    """Write the structures in question anew, raw trials that are new, and what has changed of the others."""
+    held = before.owners
     section = write_learner(memory.learner, len(held))
     new = section.pop("trials")
     evidence = write_evidence(memory)
@@ -168,6 +179,12 @@ def _write_structure(
     connection.execute("INSERT OR REPLACE INTO structure VALUES (1, ?)", (_compact(section),))
     changed = ((ids[owner], number) for number, owner in enumerate(owners[: len(held)]) if owner != held[number])
     connection.executemany("UPDATE raw_trials SET graph = ? WHERE number = ?", changed)
+    seen = (
+        (_compact([list(look) for look in trial.detections]), number)
+        for number, (trial, old) in enumerate(zip(memory.learner.trials, before.raw, strict=False))
+        if trial.detections != old.detections
+    )
+    connection.executemany("UPDATE raw_trials SET observed = ? WHERE number = ?", seen)
     rows: Iterable[Any] = (
         (
             len(held) + index,
@@ -179,6 +196,29 @@ def _write_structure(
         for index, trial in enumerate(new)
     )
     connection.executemany("INSERT INTO raw_trials VALUES (?, ?, ?, ?, ?)", rows)
+
+
+def _write_sense(connection: sqlite3.Connection, memory: RobotMemory, held: tuple[SensedTrial, ...]) -> None:
+    """Write the trials of the sense that are new, or that are taken for something else now."""
+    if memory.sense is None:
+        return
+    section = write_sense(memory.sense, memory.assumptions)
+    trials = section.pop("trials")
+    connection.execute("INSERT OR IGNORE INTO sense VALUES (1, ?)", (_compact(section),))
+    rows = (
+        (number, _compact(document))
+        for number, (trial, document) in enumerate(zip(memory.sense.trials, trials, strict=True))
+        if number >= len(held) or trial != held[number]
+    )
+    connection.executemany("INSERT OR REPLACE INTO sensed_trials VALUES (?, ?)", rows)
+
+
+def _sensed(memory: RobotMemory) -> tuple[SensedTrial, ...]:
+    return () if memory.sense is None else tuple(memory.sense.trials)
+
+
+def _raw(memory: RobotMemory) -> tuple[RawTrial, ...]:
+    return tuple(memory.learner.trials) if isinstance(memory, StructuredMemory) else ()
 
 
 def _owners(memory: RobotMemory) -> tuple[str, ...]:

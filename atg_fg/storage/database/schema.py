@@ -61,8 +61,14 @@ _VERSION_2: Final = (
 )
 
 
+_VERSION_3: Final = (
+    "CREATE TABLE sense (id INTEGER PRIMARY KEY CHECK (id = 1), document TEXT NOT NULL)",
+    "CREATE TABLE sensed_trials (number INTEGER PRIMARY KEY, document TEXT NOT NULL)",
+)
+
+
 #: The statements of each step: the first makes the tables of version 1, the n-th leads from version n − 1 to n.
-MIGRATIONS: tuple[tuple[str, ...], ...] = (_VERSION_1, _VERSION_2)
+MIGRATIONS: tuple[tuple[str, ...], ...] = (_VERSION_1, _VERSION_2, _VERSION_3)
 
 
 def version_of(connection: sqlite3.Connection, place: str) -> int:

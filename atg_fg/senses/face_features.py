@@ -1,0 +1,115 @@
+"""What the picture on a square face looks like, whichever of its four sides is up: colours and gradients of a crop.
+
+A crop is divided into a grid. A quarter turn of the crop permutes its cells and the directions in them, so the four
+turns of a crop make a signal over the group C₄, and the magnitudes of its Fourier transform are the same for all four.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from typing import Final, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.patterns import FloatArray
+from atg_fg.senses.opencv import cv2
+
+Image: TypeAlias = NDArray[np.uint8]
+#: Turns a crop, RGB of shape [height, width, 3], into features of shape [F].
+FaceFeatures: TypeAlias = Callable[[Image], FloatArray]
+
+#: Name of ``colours_and_gradients``.
+DEFAULT_FEATURES: Final = "colours-and-gradients"
+#: Side of a crop, pixels.
+CROP: Final = 48
+_GRID: Final = 6  # cells a side
+_DIRECTIONS: Final = 8  # of gradients, without their sign
+_QUARTER: Final = _GRID // 2
+#: Lightness and colours, and gradients, on scales of their own.
+_COLOUR_SCALE: Final = 1 / 64
+_LEAST_GRADIENT: Final = 20.0
+
+
+def colours_and_gradients(crop: Image) -> FloatArray:
+    """Return the features of a square crop, shape [297], the same for each quarter turn of it.
+
+    Raises:
+        InvalidInputError: Not RGB, or not a square of at least ``CROP`` pixels.
+    """
+    check_image(crop, "crop", (CROP, CROP))
+    lab = cv2.cvtColor(crop, cv2.COLOR_RGB2LAB).astype(np.float32)
+    cells = (_GRID, _GRID)
+    colours = cv2.resize(lab, cells, interpolation=cv2.INTER_AREA) * _COLOUR_SCALE
+    smooth = cv2.GaussianBlur(lab[..., 0], (0, 0), 1.0)
+    across, down = cv2.Sobel(smooth, cv2.CV_32F, 1, 0), cv2.Sobel(smooth, cv2.CV_32F, 0, 1)
+    strength = np.hypot(across, down)
+    angle = (np.arctan2(down, across) % np.pi) / np.pi * _DIRECTIONS
+    # Each gradient counts for the two directions that it lies between.
+    apart = np.abs((angle[..., None] - np.arange(_DIRECTIONS) + _DIRECTIONS / 2) % _DIRECTIONS - _DIRECTIONS / 2)
+    gradients = cv2.resize(
+        np.ascontiguousarray(strength[..., None] * np.clip(1 - apart, 0, 1)), cells, interpolation=cv2.INTER_AREA
+    )
+    gradients = np.sqrt(gradients / (gradients.sum(axis=-1, keepdims=True) + _LEAST_GRADIENT))
+    turned = [
+        np.concatenate(
+            (np.rot90(colours, turn), np.roll(np.rot90(gradients, turn), turn * _DIRECTIONS // 2, axis=-1)), axis=-1
+        )
+        for turn in range(4)
+    ]
+    quarter = np.array([each[:_QUARTER, :_QUARTER].ravel() for each in turned])
+    # Of the four magnitudes the last is that of the second again.
+    features: FloatArray = np.abs(np.fft.fft(quarter, axis=0))[:3].ravel().astype(np.float64) / 2
+    return features
+
+
+def check_image(image: Image, place: str, size: tuple[int, int] | None = None) -> None:
+    """Raise ``InvalidInputError`` naming ``place`` unless this is an RGB image, of (width, height) if that is given."""
+    found: tuple[int, ...] = getattr(image, "shape", ())
+    expected = "width and height" if size is None else f"{size[0]} by {size[1]} pixels"
+    right = len(found) == 3 and found[2] == 3 and getattr(image, "dtype", None) == np.uint8
+    if not right or (size is not None and found[:2] != size[::-1]):
+        dtype = getattr(image, "dtype", type(image).__name__)
+        raise InvalidInputError(f"{place}: shape {found} of {dtype}; expected RGB bytes, {expected}")
+
+
+def rectified(frame: Image, corners: FloatArray, size: int = CROP) -> Image:
+    """Return a planar square in a frame as it looks from straight ahead, RGB of shape [size, size, 3].
+
+    Args:
+        frame: RGB.
+        corners: Of the square in the frame, clockwise from its upper left one, shape [4, 2], pixels.
+        size: Side of what is returned, pixels.
+    """
+    square = np.array([[0, 0], [size, 0], [size, size], [0, size]], dtype=np.float32)
+    homography = cv2.getPerspectiveTransform(corners.astype(np.float32), square)
+    return np.asarray(cv2.warpPerspective(frame, homography, (size, size), flags=cv2.INTER_AREA), dtype=np.uint8)
+
+
+def face_features(name: str) -> FaceFeatures:
+    """Return features by name: ``DEFAULT_FEATURES``, or ``module:function`` of a user's own, such as an embedding.
+
+    The name runs code: it is to come from a user, never from a file.
+
+    Raises:
+        InvalidInputError: There is no such function.
+    """
+    if name == DEFAULT_FEATURES:
+        return colours_and_gradients
+    module, _, attribute = name.partition(":")
+    try:
+        found = getattr(importlib.import_module(module), attribute) if module and attribute else None
+    except (ImportError, AttributeError, ValueError) as error:
+        raise InvalidInputError(f"features: {name!r}: {error}; expected module:function on Python's path") from error
+    if not callable(found):
+        raise InvalidInputError(f"features: {name!r}; expected {DEFAULT_FEATURES!r} or module:function")
+
+    def checked(crop: Image) -> FloatArray:
+        values: FloatArray = np.asarray(found(crop), dtype=np.float64)
+        if values.ndim != 1 or not np.isfinite(values).all():
+            raise InvalidInputError(f"features: {name!r}: shape {values.shape}; expected finite numbers, one axis")
+        return values
+
+    return checked

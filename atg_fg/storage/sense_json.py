@@ -1,0 +1,115 @@
+"""A sense as a section of a memory file, checked on the way in: its space, and what its classes were made from."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from atg_fg.core.assumptions import Assumptions
+from atg_fg.core.checks import number, plain_text
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.sense import Reading, Sense, SensedTrial
+from atg_fg.senses.appearance import AppearanceSense
+from atg_fg.senses.feature_space import FeatureSpace
+from atg_fg.storage.checked_json import placed, read_list, read_object
+
+
+def write_sense(sense: Sense, assumptions: Assumptions) -> dict[str, Any]:
+    """Return a sense as JSON knows it."""
+    if not isinstance(sense, AppearanceSense):
+        raise InvalidInputError(f"sense: {type(sense).__name__}; expected an AppearanceSense, which files can hold")
+    return {**write_settings(sense), "trials": [write_sensed_trial(trial, assumptions) for trial in sense.trials]}
+
+
+def write_settings(sense: AppearanceSense) -> dict[str, Any]:
+    """Return all of a sense but what it has learned."""
+    return {
+        **sense.space.to_document(),
+        "within": sense.codebook.within,
+        "concentration": sense.codebook.concentration,
+    }
+
+
+def write_sensed_trial(trial: SensedTrial, assumptions: Assumptions) -> dict[str, Any]:
+    """Return a trial of a sense as JSON knows it."""
+    return {
+        "object": trial.owner,
+        "readings": [[None if slot is None else list(slot) for slot in look] for look in trial.readings],
+        "classes": [list(detection) for detection in trial.detections],
+        "actions": [assumptions.actions[action] for action in trial.actions],
+    }
+
+
+def read_sense(value: Any, assumptions: Assumptions, place: str) -> AppearanceSense:
+    """Return the sense at ``place``.
+
+    Raises:
+        InvalidInputError: Anything malformed; the message names the place.
+    """
+    keys = ("features", "mean", "projection", "between", "within", "concentration", "trials")
+    fields = read_object(value, place, keys)
+    rows = read_list(fields["projection"], f"{place}.projection")
+    width = len(read_list(fields["between"], f"{place}.between"))
+    projection = [_numbers(row, f"{place}.projection[{index}]", width) for index, row in enumerate(rows)]
+    settings = {name: number(fields[name], f"{place}.{name}") for name in ("within", "concentration")}
+    with placed(place):
+        space = FeatureSpace(
+            plain_text(fields["features"], "features"),
+            np.array(_numbers(fields["mean"], "mean", len(rows))),
+            np.array(projection).reshape(-1, width),
+            np.array(_numbers(fields["between"], "between", width)),
+        )
+        sense = AppearanceSense(space, assumptions.alphabet, **settings)
+    entries = read_list(fields["trials"], f"{place}.trials")
+    trials = [
+        _read_trial(entry, assumptions, space.n_dimensions, f"{place}.trials[{index}]")
+        for index, entry in enumerate(entries)
+    ]
+    sense.restore(trials)
+    return sense
+
+
+def _read_trial(value: Any, assumptions: Assumptions, n_dimensions: int, place: str) -> SensedTrial:
+    fields = read_object(value, place, ("object", "readings", "classes", "actions"))
+    names = read_list(fields["actions"], f"{place}.actions")
+    actions = [assumptions.action_index(name, f"{place}.actions[{index}]") for index, name in enumerate(names)]
+    looks = {key: read_list(fields[key], f"{place}.{key}") for key in ("readings", "classes")}
+    for key, found in looks.items():
+        if len(found) != len(actions) + 1:
+            raise InvalidInputError(
+                f"{place}.{key}: {len(found)} looks, {len(actions)} actions; expected one look more"
+            )
+    readings = []
+    for index, look in enumerate(looks["readings"]):
+        where = f"{place}.readings[{index}]"
+        slots = read_list(look, where)
+        if len(slots) != len(assumptions.alphabet.slots):
+            raise InvalidInputError(f"{where}: {len(slots)} slots; expected {len(assumptions.alphabet.slots)}")
+        readings.append(tuple(_reading(slot, f"{where}[{j}]", n_dimensions) for j, slot in enumerate(slots)))
+    detections = []
+    for index, look in enumerate(looks["classes"]):
+        where = f"{place}.classes[{index}]"
+        detection = assumptions.alphabet.check_detection(read_list(look, where), where)
+        unread = [symbol for symbol, reading in zip(detection, readings[index], strict=True) if reading is None]
+        if any(symbol is not None for symbol in unread):
+            raise InvalidInputError(f"{where}: a class where nothing was measured; expected null")
+        detections.append(detection)
+    owner = plain_text(fields["object"], f"{place}.object")
+    return SensedTrial(owner, tuple(readings), tuple(detections), tuple(actions))
+
+
+def _reading(value: Any, place: str, length: int) -> Reading:
+    return None if value is None else tuple(_numbers(value, place, length))
+
+
+def _numbers(value: Any, place: str, length: int) -> list[float]:
+    found: Sequence[Any] = read_list(value, place)
+    if len(found) != length:
+        raise InvalidInputError(f"{place}: {len(found)} numbers; expected {length}")
+    return [number(entry, f"{place}[{index}]", -_GREATEST, _GREATEST) for index, entry in enumerate(found)]
+
+
+#: Beyond, sums of squares would no longer be numbers.
+_GREATEST = 1e100

@@ -1,0 +1,133 @@
+"""A camera that sees a box with pictures, and cuts out what is in front and on top."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from atg_fg.core.patterns import FloatArray
+from atg_fg.senses.face_features import check_image, rectified
+from atg_fg.worlds.arcube import FACE_NORMALS, FRONT, TOP
+from sim.bodies.cube import CUBE_CENTRE, CUBE_SIZE, FACE_UPS
+from sim.vision.box_pose import find_box, turned
+from sim.vision.camera import Camera, Light
+from sim.vision.image_noise import at_least_zero
+
+_TABLE, _FLOOR = (104, 112, 120), (204, 209, 214)
+
+
+class PictureBoxCamera:
+    """Draws a box with pictures on a table as a camera sees it.
+
+    A box is convex, so what it shows are its faces that are turned towards the camera, each a planar picture in
+    perspective (a homography), as light as its angle to the lamp makes it.
+
+    Args:
+        camera: Where it stands.
+        position_jitter: How far at most each look finds the box off its place in x and y, m.
+        yaw_jitter: How far at most it is turned about the vertical, degrees.
+        light_jitter: How much the light changes, 0 (not at all) to 1.
+        image_noise: Standard deviation of noise on each grey level (0 to 255).
+        blur: Standard deviation of a Gaussian blur, pixels.
+    """
+
+    def __init__(
+        self,
+        camera: Camera,
+        *,
+        position_jitter: float,
+        yaw_jitter: float,
+        light_jitter: float,
+        image_noise: float,
+        blur: float,
+    ) -> None:
+        self.camera = camera
+        self.position_jitter = at_least_zero("position_jitter", position_jitter)
+        self.yaw_jitter = at_least_zero("yaw_jitter", yaw_jitter)
+        self.light_jitter = at_least_zero("light_jitter", light_jitter)
+        self.image_noise = at_least_zero("image_noise", image_noise)
+        self.blur = at_least_zero("blur", blur)
+        #: The table without a box in usual light, RGB, shape [height, width, 3].
+        self.empty = self._draw_table()
+
+    def project(self, points: FloatArray) -> FloatArray:
+        """Return where points of the world, shape [n, 3], m, are in the image, shape [n, 2], pixels."""
+        seen = (points - np.array(self.camera.eye)) @ self.camera.rotation
+        pixels = seen @ self.camera.intrinsics.T
+        return np.asarray(pixels[:, :2] / pixels[:, 2:])
+
+    def _draw_table(self) -> NDArray[np.float32]:
+        width, height = self.camera.image_size
+        drawn = np.empty((height, width, 3), dtype=np.float32)
+        drawn[:] = _FLOOR
+        z = CUBE_CENTRE[2] - CUBE_SIZE / 2
+        table = np.array([[0.18, -0.4, z], [0.82, -0.4, z], [0.82, 0.4, z], [0.18, 0.4, z]])
+        cv2.fillConvexPoly(drawn, np.round(self.project(table)).astype(np.int32), _TABLE, cv2.LINE_AA)
+        return drawn
+
+    def frame(
+        self, pictures: Sequence[NDArray[np.uint8]], rotation: FloatArray, rng: np.random.Generator
+    ) -> NDArray[np.uint8]:
+        """Return what the camera sees, RGB, shape [height, width, 3].
+
+        Args:
+            pictures: On each face, in the order of ``FACES``.
+            rotation: Of the box, shape [3, 3].
+            rng: Of pose, light and noise.
+        """
+        offset = np.append(rng.uniform(-1, 1, 2) * self.position_jitter, 0.0)
+        turn = turned(float(np.radians(rng.uniform(-1, 1) * self.yaw_jitter)))
+        change = self.light_jitter * rng.uniform(-1, 1, 3)
+        lamp = np.add(Light().direction, (change[0], change[1], 0.0))
+        lamp /= np.linalg.norm(lamp)
+        lightness = 1.0 + 0.5 * change[2]
+        frame: NDArray[Any] = self.empty * np.float32(lightness)
+        centre = CUBE_CENTRE + offset
+        for face, normal in enumerate((turn @ rotation @ FACE_NORMALS.T).T):
+            if normal @ (np.array(self.camera.eye) - centre - normal * CUBE_SIZE / 2) <= 0:
+                continue
+            shade = lightness * (Light().ambient + Light().diffuse * max(0.0, float(normal @ lamp)))
+            corners = self.project(_corners(face, turn @ rotation, centre)).astype(np.float32)
+            picture = np.asarray(pictures[face] * np.float32(shade))
+            side = picture.shape[0]
+            square = np.array([[0, 0], [side, 0], [side, side], [0, side]], dtype=np.float32)
+            homography = cv2.getPerspectiveTransform(square, corners)
+            size = self.camera.image_size
+            drawn = cv2.warpPerspective(picture, homography, size, borderMode=cv2.BORDER_REPLICATE)
+            inside = np.zeros(size[::-1], dtype=np.uint8)
+            cv2.fillConvexPoly(inside, np.round(corners).astype(np.int32), 1)
+            cv2.copyTo(drawn, inside, frame)
+        if self.blur:
+            frame = cv2.GaussianBlur(frame, (0, 0), self.blur)
+        if self.image_noise:
+            frame = frame + rng.normal(0.0, self.image_noise, (*frame.shape[:2], 1)).astype(np.float32)
+        return np.clip(np.round(frame), 0, 255).astype(np.uint8)
+
+    def crops(self, frame: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Return what is in front and on top, as if seen from straight ahead, shape [2, side, side, 3].
+
+        Where the box stands is told from its outline; if that does not look like one, it is taken to stand where it
+        should.
+
+        Raises:
+            InvalidInputError: A frame of another size or type.
+        """
+        check_image(frame, "frame", self.camera.image_size)
+        pose = find_box(frame, self.empty, self.project)
+        x, y, yaw = np.zeros(3) if pose is None else pose
+        centre = np.add(CUBE_CENTRE, (x, y, 0.0))
+        faces = [self.project(_corners(place, turned(float(yaw)), centre)) for place in (FRONT, TOP)]
+        return np.array([rectified(frame, face) for face in faces])
+
+
+def _corners(face: int, rotation: FloatArray, centre: FloatArray) -> FloatArray:
+    """Return the corners of a face, clockwise from the upper left one of its picture, shape [4, 3], m."""
+    normal, up = FACE_NORMALS[face], FACE_UPS[face]
+    right = np.cross(up, normal)
+    half = CUBE_SIZE / 2
+    own = half * (normal + np.array([up - right, up + right, right - up, -up - right]))
+    return np.asarray(own @ rotation.T + centre)

@@ -1,0 +1,171 @@
+"""Boxes with pictures before a camera: turned kinematically, each look rendered anew, read without tags."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from atg_fg.core.assumptions import Assumptions
+from atg_fg.core.errors import unknown_name
+from atg_fg.core.patterns import FloatArray, PatternAlphabet
+from atg_fg.senses.appearance import APPEARANCE, SEEN, AppearanceSense, appearance_space
+from atg_fg.senses.face_features import CROP, DEFAULT_FEATURES, face_features
+from atg_fg.senses.feature_space import FeatureSpace
+from atg_fg.worlds.arcube import (
+    ACTION_SOURCES,
+    FACES,
+    FRONT,
+    ORIENTATIONS,
+    SUCCESSORS,
+    TOP,
+    rotation_of,
+    shown_pattern,
+)
+from atg_fg.worlds.base import FiniteStateWorld
+from sim.bodies.pictures import draw_picture, make_picture_boxes
+from sim.vision.camera import Camera
+from sim.vision.picture_box_camera import PictureBoxCamera
+from sim.worlds.rendered_world import checked_size
+
+#: Numbers that classes of appearance can have.
+MOST_CLASSES: Final = 48
+_SLOTS: Final = ("front", "top")
+#: How much a look differs from the next one at the same box.
+USUAL_JITTER: Final = {
+    "position_jitter": 0.012,
+    "yaw_jitter": 6.0,
+    "light_jitter": 0.5,
+    "image_noise": 8.0,
+    "blur": 0.6,
+}
+#: Boxes whose pictures calibrate the features, each seen in all its orientations, and directions that are kept.
+_CALIBRATION_SEED: Final = 987_654_321
+_CALIBRATION_BOXES, _DIMENSIONS = 24, 24
+#: How much more looks at one picture scatter than on average over pictures, and than those that were calibrated on.
+_WITHIN: Final = 2.0
+
+
+class PictureBoxWorld(FiniteStateWorld):
+    """One box that three actions turn: flip, left, right; what is in front and on top is looked at.
+
+    An observation has the features of both faces (``appearance``), and which of them were ``seen``.
+
+    Args:
+        n_objects: How many boxes there are.
+        objects_seed: Seed that they and their pictures are drawn by.
+        look_alikes: Share of the boxes that differ from another one in a single face.
+        features: ``"colours-and-gradients"``, or ``module:function`` of a user's own.
+        slip: Probability that an action fails and the box stays as it is.
+        missing: Probability, for each slot alone, that it is not seen.
+        image_size: (width, height) of the frame, pixels.
+        position_jitter: How far at most each look finds the box off its place in x and y, m.
+        yaw_jitter: How far at most it is turned about the vertical, degrees.
+        light_jitter: How much the light changes from look to look, 0 (not at all) to 1.
+        image_noise: Standard deviation of noise on each grey level (0 to 255).
+        blur: Standard deviation of a Gaussian blur, pixels.
+        render_mode: ``"rgb_array"`` for the camera frame, or ``None``.
+
+    Attributes:
+        frame: The last camera frame, RGB, shape [height, width, 3].
+        crops: The faces in front and on top that were cut out of it, RGB, shape [2, side, side, 3].
+        sense: One that reads these observations and knows no class yet.
+
+    Raises:
+        InvalidInputError: An option out of its range.
+    """
+
+    metadata: dict[str, Any] = {"render_modes": ["rgb_array"], "render_fps": 1}  # noqa: RUF012
+    state_name = "orientation"
+
+    def __init__(
+        self,
+        n_objects: int = 100,
+        objects_seed: int = 0,
+        *,
+        look_alikes: float = 0.1,
+        features: str = DEFAULT_FEATURES,
+        slip: float = 0.0,
+        missing: float = 0.0,
+        image_size: tuple[int, int] = (320, 240),
+        position_jitter: float = 0.012,
+        yaw_jitter: float = 6.0,
+        light_jitter: float = 0.5,
+        image_noise: float = 8.0,
+        blur: float = 0.6,
+        render_mode: str | None = None,
+    ) -> None:
+        self.boxes = make_picture_boxes(n_objects, objects_seed, look_alikes=look_alikes)
+        n_actions, n_slots = len(ACTION_SOURCES), len(_SLOTS)
+        noise = {"slip": slip, "missing": missing}
+        super().__init__(n_objects, n_actions, n_slots, MOST_CLASSES, render_mode=render_mode, **noise)
+        if render_mode not in (None, *self.metadata["render_modes"]):
+            raise unknown_name("render mode", render_mode, self.metadata["render_modes"])
+        self.features = face_features(features)
+        self.camera = PictureBoxCamera(
+            Camera(image_size=checked_size(image_size)),
+            position_jitter=position_jitter,
+            yaw_jitter=yaw_jitter,
+            light_jitter=light_jitter,
+            image_noise=image_noise,
+            blur=blur,
+        )
+        self.alphabet = PatternAlphabet(_SLOTS, MOST_CLASSES, exclusive=False)
+        space = calibrated_space(features)
+        self.sense = AppearanceSense(space, self.alphabet, within=_WITHIN)
+        self.observation_space: Any = appearance_space(n_slots, space.n_features)
+        width, height = self.camera.camera.image_size
+        self.frame: NDArray[np.uint8] = np.zeros((height, width, 3), dtype=np.uint8)
+        self.crops: NDArray[np.uint8] = np.zeros((n_slots, CROP, CROP, 3), dtype=np.uint8)
+
+    @property
+    def assumptions(self) -> Assumptions:
+        """What a robot in this world takes for granted."""
+        return Assumptions(len(self.boxes.faces), len(ORIENTATIONS), tuple(ACTION_SOURCES), self.alphabet)
+
+    def render(self) -> NDArray[np.uint8] | None:
+        """Return the last camera frame, RGB, shape [height, width, 3]; ``None`` without a render mode."""
+        return None if self.render_mode is None else self.frame.copy()
+
+    def _n_states(self) -> int:
+        return len(ORIENTATIONS)
+
+    def _successor(self, action: int) -> int:
+        return SUCCESSORS[self.state][action]
+
+    def _pattern(self) -> tuple[int, ...]:
+        return shown_pattern(self.boxes.faces[self.object], self.state)
+
+    def _look(self) -> dict[str, NDArray[Any]]:
+        """Take a frame, and return the features of what is in front and on top of it."""
+        pictures = [self.boxes.pictures[picture] for picture in self.boxes.faces[self.object]]
+        self.frame = self.camera.frame(pictures, rotation_of(self.state), self.np_random)
+        self.crops = self.camera.crops(self.frame)
+        appearance = np.array([self.features(crop) for crop in self.crops], dtype=np.float64)
+        seen = np.ones(len(_SLOTS), dtype=np.int8)
+        if self.missing:
+            seen[self.np_random.random(len(_SLOTS)) < self.missing] = 0
+        return {APPEARANCE: appearance * seen[:, None], SEEN: seen}
+
+
+@lru_cache(maxsize=4)
+def calibrated_space(features: str) -> FeatureSpace:
+    """Return the space of features, calibrated on pictures that are on no box of any world.
+
+    Args:
+        features: ``"colours-and-gradients"``, or ``module:function`` of a user's own.
+    """
+    make, camera = face_features(features), PictureBoxCamera(Camera(), **USUAL_JITTER)
+    rng = np.random.default_rng(_CALIBRATION_SEED)
+    looks: list[list[FloatArray]] = []
+    for _ in range(_CALIBRATION_BOXES):
+        pictures = [draw_picture(rng) for _ in FACES]
+        of_face: list[list[FloatArray]] = [[] for _ in FACES]
+        for orientation, faces in enumerate(ORIENTATIONS):
+            crops = camera.crops(camera.frame(pictures, rotation_of(orientation), rng))
+            for place, crop in zip((FRONT, TOP), crops, strict=True):
+                of_face[faces[place]].append(make(crop))
+        looks += of_face
+    return FeatureSpace.calibrated(features, looks, _DIMENSIONS)

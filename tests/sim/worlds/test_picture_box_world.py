@@ -1,0 +1,155 @@
+"""The world of boxes without tags: what it says, and that classes are found in what its camera sees."""
+
+from collections import Counter
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from atg_fg.core.errors import InvalidInputError, UnknownNameError
+from atg_fg.core.memory import RobotMemory
+from atg_fg.engines import begin_trial
+from atg_fg.experiments.table1 import TestPlan, run_test
+from atg_fg.experiments.trial import learn_from, run_trial
+from atg_fg.learning.structured_memory import memory_for
+from atg_fg.policies import RandomPolicy
+from atg_fg.senses.appearance import AppearanceSense
+from atg_fg.storage.memory_files import load_memory, open_memory, save_memory
+from atg_fg.storage.presets import preset
+from atg_fg.worlds.arcube import canonical
+from atg_fg.worlds.registry import assumptions_of, make_world_with, sense_of
+from sim.bodies.pictures import PLAIN, make_picture_boxes
+
+
+@pytest.fixture(scope="module")
+def world():
+    with make_world_with("picture-box", 12, 3) as made:
+        yield made
+
+
+def memory_of(world, structured=False):
+    empty = RobotMemory(assumptions_of(world, 12), sense=sense_of(world))
+    return memory_for(preset("learned"), empty) if structured else empty
+
+
+def trials(world, memory, n, seed=0):
+    """Let a memory learn from trials of six random actions each; return their records."""
+    records = []
+    for number in range(n):
+        rng = np.random.default_rng((seed, number))
+        record = run_trial(world, begin_trial("bayes-filter", memory, preset("default")), RandomPolicy(), 6, rng)
+        learn_from(record, memory)
+        records.append(record)
+    return records
+
+
+def test_boxes_share_pictures_and_no_two_are_the_same_however_they_are_turned():
+    boxes = make_picture_boxes(100, 5)
+    assert len({canonical(faces) for faces in boxes.faces}) == 100
+    shown = Counter(picture for faces in boxes.faces for picture in faces)
+    assert 0.19 < shown[PLAIN] / 600 < 0.31
+    assert all(count > 1 for count in shown.values())
+    alike = make_picture_boxes(40, 5, look_alikes=1.0).faces
+    nearest = [
+        min(sum(a != b for a, b in zip(ours, theirs, strict=True)) for theirs in alike[:n])
+        for n, ours in enumerate(alike)
+        if n
+    ]
+    assert nearest == [1] * 39
+
+
+def test_observations_are_of_the_space_and_each_look_is_drawn_anew(world):
+    first, _ = world.reset(seed=1, options={"object": 2, "orientation": 5})
+    again, _ = world.reset(seed=1, options={"object": 2, "orientation": 5})
+    other, info = world.reset(seed=2, options={"object": 2, "orientation": 5})
+    assert world.observation_space.contains(first)
+    assert (first["appearance"] == again["appearance"]).all()
+    assert (first["appearance"] != other["appearance"]).any()
+    assert (info["object"], info["orientation"]) == (2, 5)
+
+
+def test_a_quarter_turn_of_a_crop_has_the_same_features(world):
+    world.reset(seed=1)
+    features = world.get_wrapper_attr("features")
+    crop = world.get_wrapper_attr("crops")[1]
+    turned = features(np.ascontiguousarray(np.rot90(crop)))
+    other = features(world.get_wrapper_attr("crops")[0])
+    assert np.linalg.norm(turned - features(crop)) < 0.1 * np.linalg.norm(other - features(crop))
+
+
+def test_classes_found_without_labels_are_the_pictures(world):
+    memory = memory_of(world)
+    records = trials(world, memory, 12)
+    found = Counter()
+    for record, trial in zip(records, memory.sense.trials, strict=True):
+        for step, detection in zip(record.steps, trial.detections, strict=True):
+            found.update(zip(detection, step.truth["pattern"], strict=True))
+    # Every class is one picture, and nearly every picture one class.
+    assert len({symbol for symbol, _ in found}) == len(found)
+    assert len(found) <= len({picture for _, picture in found}) + 2
+
+
+@pytest.mark.parametrize("structured", [False, True])
+@pytest.mark.parametrize("name", ["memory.json", "memory.db"])
+def test_what_a_memory_knows_of_appearances_is_saved_with_it(world, tmp_path, name, structured):
+    memory = memory_of(world, structured)
+    trials(world, memory, 3)
+    save_memory(memory, tmp_path / name)
+    loaded = load_memory(tmp_path / name)
+    assert loaded == memory
+    for each in (memory, loaded):
+        trials(world, each, 1, seed=7)
+    assert loaded == memory
+    assert loaded.sense.codebook.counts.tolist() == memory.sense.codebook.counts.tolist()
+
+
+def test_a_memory_in_a_database_goes_on_with_its_classes(world, tmp_path):
+    memory = memory_of(world, structured=True)
+    save_memory(memory, tmp_path / "memory.db")
+    with open_memory(tmp_path / "memory.db") as kept:
+        trials(world, memory, 4)
+        trials(world, kept, 4)
+        assert kept == memory
+    assert load_memory(tmp_path / "memory.db") == memory
+
+
+def test_readings_in_a_record_are_all_that_learning_needs(tmp_path):
+    plan = TestPlan(world="picture-box", engine="bayes-filter", n_trials=4, n_actions=3, n_objects=3)
+    whole = run_test(plan, 0, memories=tmp_path)
+    run_test(plan, 0, records=tmp_path / "records")
+    resumed = run_test(plan, 0, records=tmp_path / "records", resume=True, memories=tmp_path / "again")
+    assert resumed == whole
+    assert load_memory(tmp_path / "again" / "memory-0000.json") == load_memory(tmp_path / "memory-0000.json")
+
+
+def test_a_memory_of_other_features_or_of_none_is_refused(world):
+    without = RobotMemory(assumptions_of(world, 12))
+    inference = begin_trial("bayes-filter", without, preset("default"))
+    with pytest.raises(InvalidInputError, match="features 'colours-and-gradients', memory without a sense"):
+        run_trial(world, inference, RandomPolicy(), 1, np.random.default_rng(0))
+    own = sense_of(world)
+    other = AppearanceSense(replace(own.space, features="mine:embed"), own.alphabet)
+    memory = RobotMemory(assumptions_of(world, 12), sense=other)
+    inference = begin_trial("bayes-filter", memory, preset("default"))
+    with pytest.raises(InvalidInputError, match="features 'colours-and-gradients', memory of 'mine:embed'"):
+        run_trial(world, inference, RandomPolicy(), 1, np.random.default_rng(0))
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"features": "no_such_module:embed"}, "features: 'no_such_module:embed'"),
+        ({"features": "sift"}, "expected 'colours-and-gradients' or module:function"),
+        ({"look_alikes": 2.0}, "look_alikes: 2.0; expected a probability"),
+        ({"image_noise": -1.0}, "image_noise: -1.0; expected a finite number"),
+        ({"n_objects": 0}, "n_objects: 0"),
+    ],
+)
+def test_options_of_nonsense_are_refused(options, message):
+    with pytest.raises(InvalidInputError, match=message):
+        make_world_with("picture-box", options.pop("n_objects", 3), 0, **options)
+
+
+def test_there_is_one_render_mode():
+    with pytest.raises(UnknownNameError, match="human"):
+        make_world_with("picture-box", 3, 0, render_mode="human")
