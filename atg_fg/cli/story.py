@@ -8,7 +8,7 @@ from rich.console import Console
 
 from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.memory import RobotMemory
-from atg_fg.core.records import TrialRecord, TrialStep
+from atg_fg.core.records import Mistake, TrialRecord, TrialStep
 
 _BAR = 24
 
@@ -60,8 +60,8 @@ class Story:
             text = f"verdict: {record.matched} (probability {probability:.1%})"
         self.console.print(text, style="bold green")
 
-    def mistakes(self, wrong: Sequence[tuple[int, int, float]]) -> None:
-        """Print which labels were probably wrong: look, slot and probability of each."""
+    def mistakes(self, wrong: Sequence[Mistake]) -> None:
+        """Print which labels were probably wrong."""
         slots = self.assumptions.alphabet.slots
         for look, slot, probability in wrong:
             self.console.print(f"look {look}, {slots[slot]}, was probably a mistake: {probability:.0%}")

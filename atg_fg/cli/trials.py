@@ -21,7 +21,6 @@ from atg_fg.core.records import Experiment, TrialStep, TrialSummary
 from atg_fg.core.version import __version__
 from atg_fg.display.frames import FrameFolder
 from atg_fg.engines import begin_trial
-from atg_fg.engines.learned_structure import LearnedStructure
 from atg_fg.experiments.replay import replay as replay_script
 from atg_fg.experiments.trial import learn_from, run_trial
 from atg_fg.learning.structured_memory import memory_for
@@ -105,8 +104,7 @@ def trial(
 
         result = run_trial(made_world, inference, chosen_policy, actions, rng, on_step=on_step)
         story.verdict(result)
-        if isinstance(inference, LearnedStructure):
-            story.mistakes(inference.mistakes())
+        story.mistakes(result.mistakes)
         lines = to_json_lines(result, camera.names if camera is not None else (), **header)
         if record is not None:
             plain_files.write_bytes_atomically(record, lines.encode())

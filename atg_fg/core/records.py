@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Final, Literal, TypeAlias, get_args
+from typing import Any, Final, Literal, NamedTuple, TypeAlias, get_args
 
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.belief import IdentityBelief
@@ -27,6 +27,34 @@ def confidences_of(looks: Sequence[Mapping[str, Any]]) -> tuple[Confidences, ...
     """Return the confidences in the ``info`` of each look; empty if there are none at all."""
     stated = tuple(confidences_in(info) for info in looks)
     return stated if any(stated) else ()
+
+
+class Mistake(NamedTuple):
+    """A label that is probably wrong.
+
+    Attributes:
+        look: From 0.
+        slot: Index of it.
+        probability: That the label is wrong, given the whole trial.
+    """
+
+    look: int
+    slot: int
+    probability: float
+
+
+class Mended(NamedTuple):
+    """An earlier trial that turned out to be of another object than it was taken for.
+
+    Attributes:
+        trial: Number of it among the trials that were learned from, from 0.
+        old: Name of the ATG that it was of.
+        new: Name of the one that it is of from then on.
+    """
+
+    trial: int
+    old: str
+    new: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,12 +98,14 @@ class TrialRecord:
         assumptions: What the trial took for granted.
         steps: The looks, t + 1 of them for t actions; one less if the object was lost.
         lost_truth: What the world's ``info`` said when it lost the object, ``None`` if it did not.
+        mistakes: Labels that the engine takes for wrong, given the whole trial.
     """
 
     names: tuple[str, ...]
     assumptions: Assumptions
     steps: list[TrialStep] = field(default_factory=list)
     lost_truth: dict[str, Any] | None = None
+    mistakes: list[Mistake] = field(default_factory=list)
 
     @property
     def belief(self) -> IdentityBelief:
@@ -202,6 +232,8 @@ class TrialSummary:
         learned_patterns: What was learned if that is not what was seen.
         experiment: Number of its experiment in a database, ``None`` if it belongs to none.
         number: Of the trial in its experiment, from 0.
+        mistakes: Labels that the engine took for wrong, given the whole trial.
+        mended: Earlier trials that turned out to be of other objects when this one was learned.
     """
 
     verdict: Verdict
@@ -212,6 +244,8 @@ class TrialSummary:
     learned_patterns: tuple[int | None, ...] | None = None
     experiment: int | None = field(default=None, compare=False)
     number: int = field(default=0, compare=False)
+    mistakes: tuple[Mistake, ...] = ()
+    mended: tuple[Mended, ...] = ()
 
     @classmethod
     def of(
@@ -244,7 +278,15 @@ class TrialSummary:
         patterns = None if learned_patterns is None else tuple(learned_patterns)
         if patterns == tuple(record.patterns):
             patterns = None
-        return cls(record.verdict, record.matched, tuple(steps), record.lost_truth, learned, patterns)
+        return cls(
+            record.verdict,
+            record.matched,
+            tuple(steps),
+            record.lost_truth,
+            learned,
+            patterns,
+            mistakes=tuple(record.mistakes),
+        )
 
     @property
     def patterns(self) -> tuple[int | None, ...]:

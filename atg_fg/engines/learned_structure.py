@@ -16,6 +16,7 @@ from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.log_math import log_of, log_sum_exp
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.patterns import Evidence, FloatArray
+from atg_fg.core.records import Mistake
 from atg_fg.engines.bayes_filter import BayesFilter
 from atg_fg.inference.belief_components import LEAST_PROBABILITY, BeliefComponent, components_of, shown_patterns_of
 from atg_fg.inference.belief_tree import BeliefNode
@@ -123,7 +124,7 @@ class LearnedStructure(BayesFilter):
             sampled[memory.names.index(name)] += probability
         return IdentityBelief.of(np.maximum(total, 0.0) + erring * sampled, self.model.n_unseen)
 
-    def mistakes(self, least: float = 0.5) -> list[tuple[int, int, float]]:
+    def mistakes(self, least: float = 0.5) -> list[Mistake]:
         """Return the look, the slot and the probability of each label that is probably wrong, given the whole trial.
 
         Only of the model in which looks err, for the object that is most probable under it; empty without.
@@ -146,7 +147,7 @@ class LearnedStructure(BayesFilter):
                 for slot, right in enumerate(slots):
                     if right is not None:
                         wrong[look, slot] = wrong.get((look, slot), 0.0) + share * (1.0 - right)
-        return [(*place, probability) for place, probability in wrong.items() if probability >= least]
+        return [Mistake(*place, probability) for place, probability in wrong.items() if probability >= least]
 
     def _log_joints(self) -> list[FloatArray]:
         """Return ln p(O, type, z_0:t | a_1:t) of being plain, then of following each structure, each of shape [H]."""

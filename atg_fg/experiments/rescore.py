@@ -55,4 +55,5 @@ def _judged(
         record.steps.append(TrialStep(look.observed, evidence.pattern, belief, evidenced, look.truth, None, action))
         if action is not None:
             inference.act(action)
+    record.mistakes = inference.mistakes()
     return record

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from atg_fg.core.checks import whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
-from atg_fg.core.records import TrialRecord, TrialSummary
+from atg_fg.core.records import Mended, TrialRecord, TrialSummary
 from atg_fg.engines import begin_trial, check_engine
 from atg_fg.experiments.executors.base import is_cluster, run_pieces
 from atg_fg.experiments.executors.steps import step_done
@@ -25,7 +25,7 @@ from atg_fg.experiments.trial import learn_from, run_trial
 from atg_fg.inference.interface import Inference
 from atg_fg.inference.smoothing import smoothed_patterns
 from atg_fg.learning.duplicates import merge_duplicates
-from atg_fg.learning.structured_memory import memory_for
+from atg_fg.learning.structured_memory import StructuredMemory, memory_for
 from atg_fg.policies import Policy, check_entropy_threshold, make_policy
 from atg_fg.storage.database.trial_log import DatabaseTrialLog, check_not_in_database
 from atg_fg.storage.growing_file import check_not_begun
@@ -127,7 +127,7 @@ def run_test(
             record = run_trial(world, inference, policy, plan.n_actions, rng)
             smoothed = _smoothed(inference, record) if plan.smoothed_learning else None
             trial = TrialSummary.of(record, learned_patterns=smoothed)
-            _learn_and_score(trial, memory, plan, score)
+            trial = replace(trial, mended=_learn_and_score(trial, memory, plan, score))
             if log is not None:
                 log.append(trial)
             if on_trial is not None:
@@ -139,12 +139,16 @@ def run_test(
     return score.result(seed, merging=plan.merge_duplicates)
 
 
-def _learn_and_score(trial: TrialSummary, memory: RobotMemory, plan: TestPlan, score: Score) -> None:
+def _learn_and_score(trial: TrialSummary, memory: RobotMemory, plan: TestPlan, score: Score) -> tuple[Mended, ...]:
+    """Learn from a trial, score it, and return which earlier trials turned out to be of other objects."""
+    before = memory.reassignments if isinstance(memory, StructuredMemory) else ()
     learned = learn_from(trial, memory)
     score.add(trial, learned)
     score.mend(memory)
     if plan.merge_duplicates and learned is not None:
         score.add_merges(merge_duplicates(memory, plan.parameters, learned))
+    after = memory.reassignments[len(before) :] if isinstance(memory, StructuredMemory) else ()
+    return tuple(Mended(each.trial, each.old, each.new) for each in after)
 
 
 def _open_log(

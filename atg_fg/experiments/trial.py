@@ -119,6 +119,7 @@ def run_trial(
         if on_step is not None:
             on_step(step)
         if choice is None or choice.action is None:
+            record.mistakes = inference.mistakes()
             return record
         inference.act(choice.action)
         observation, _, terminated, truncated, truth = world.step(np.int64(choice.action))
@@ -126,6 +127,11 @@ def run_trial(
             record.lost_truth = truth
             return record
         remaining = 0 if terminated or truncated else remaining - 1
+
+
+def can_be_learned(trial: TrialSummary) -> bool:
+    """Return whether there is anything to learn: a verdict, and a pattern that was seen whole."""
+    return trial.verdict not in ("lost", "undecided") and any(pattern is not None for pattern in trial.patterns)
 
 
 def learn_from(record: TrialRecord | TrialSummary, memory: RobotMemory) -> str | None:
@@ -136,7 +142,7 @@ def learn_from(record: TrialRecord | TrialSummary, memory: RobotMemory) -> str |
     trial = TrialSummary.of(record) if isinstance(record, TrialRecord) else record
     with memory.transaction():
         name = None
-        if trial.verdict not in ("lost", "undecided") and any(pattern is not None for pattern in trial.patterns):
+        if can_be_learned(trial):
             actions = [memory.assumptions.action_index(action) for action in trial.actions[: len(trial.steps) - 1]]
             name = memory.learn(list(trial.patterns), actions, trial.matched)
             name = memory.learn_shared(name, trial.detections, actions, trial.confidences)

@@ -16,6 +16,7 @@ from atg_fg.core.errors import ImpossibleEvidenceError, InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, FloatArray, protect
+from atg_fg.core.records import Mistake
 from atg_fg.inference.belief_components import BeliefComponent, components_of, shown_patterns_of
 from atg_fg.inference.belief_tree import BeliefNode, TableBeliefNode
 from atg_fg.inference.chain import Chain, build_chain, forward_backward
@@ -128,6 +129,14 @@ class Inference(ABC):
         the past again in the light of this one.
         """
         return self.identity()
+
+    def mistakes(self, least: float = 0.5) -> list[Mistake]:
+        """Return the labels that are probably wrong, given the whole trial; none of engines that do not ask for them.
+
+        Args:
+            least: Labels that are wrong with less probability are left out.
+        """
+        return []
 
     def expected_entropies(self) -> FloatArray:
         """E[H(O | z_{t+1}, a, …)] of each action (eq. 3) in nats, shape [A].

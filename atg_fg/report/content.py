@@ -79,6 +79,7 @@ class TrialPage:
         looks: All looks, at least one.
         graphs: The ATGs that the looks point at.
         goal: The symbols wanted, ``None`` where any will do, if there was a goal.
+        notes: Sentences on what the robot made of the trial later, or of its looks in the end.
     """
 
     title: str
@@ -88,6 +89,7 @@ class TrialPage:
     looks: tuple[Look, ...]
     graphs: tuple[PlacedGraph, ...]
     goal: Detection | None = None
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -64,6 +64,15 @@ def told_verdict(verdict: str, matched: object) -> str:
     return words.get(verdict, f"{matched}")
 
 
+def told_mistakes(trial: TrialSummary, assumptions: Assumptions) -> tuple[str, ...]:
+    """Return in words which looks the robot took for mistakes."""
+    slots = assumptions.alphabet.slots
+    return tuple(
+        f"Look {look}{f', {slots[slot]},' if len(slots) > 1 else ''} was probably a mistake: {probability:.0%}."
+        for look, slot, probability in trial.mistakes
+    )
+
+
 def with_graphs(
     page: TrialPage, looks: Sequence[Look], memory: RobotMemory | None, assumptions: Assumptions, matched: str | None
 ) -> TrialPage:

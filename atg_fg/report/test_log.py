@@ -7,6 +7,7 @@ recorded of it.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -18,10 +19,10 @@ from atg_fg.core.patterns import Evidence
 from atg_fg.core.records import TrialSummary
 from atg_fg.engines import begin_trial
 from atg_fg.experiments.scores import Score
-from atg_fg.experiments.trial import learn_from
+from atg_fg.experiments.trial import can_be_learned, learn_from
 from atg_fg.policies import EntropyPolicy
 from atg_fg.report.content import Look, Report, TrialPage, shown_parameters
-from atg_fg.report.summaries import looks_of, told_truth, told_verdict, with_graphs
+from atg_fg.report.summaries import looks_of, told_mistakes, told_truth, told_verdict, with_graphs
 from atg_fg.report.trial_record import best_objects
 from atg_fg.storage.checked_json import placed
 from atg_fg.storage.recorded_test import RecordedTest
@@ -50,9 +51,32 @@ def test_report(test: RecordedTest) -> Report:
     for number, trial in enumerate(test.trials):
         with placed(f"{test.place}: trial {number}"):
             pages.append(told.page(trial, f"trial {number}", test.parameters, by_entropy=by_entropy))
+    pages = with_mended(pages, test.trials)
     title = f"A test of {len(pages)} trials, {told.score.successes} of them right"
     notes = () if told.inferred else (_NOT_INFERRED,)
     return Report(title, shown_parameters(test.header), notes, test.assumptions, tuple(pages))
+
+
+def with_mended(pages: Sequence[TrialPage], trials: Sequence[TrialSummary]) -> list[TrialPage]:
+    """Return pages of trials that also say which verdicts were mended, and after which trial.
+
+    Raises:
+        InvalidInputError: A trial was mended that had not been learned from by then.
+    """
+    notes: list[list[str]] = [[] for _ in pages]
+    learned: list[int] = []
+    for number, trial in enumerate(trials):
+        if can_be_learned(trial):
+            learned.append(number)
+        for each in trial.mended:
+            if each.trial >= len(learned):
+                raise InvalidInputError(f"trial {number}: mended: {each.trial}; expected less than {len(learned)}")
+            mended = learned[each.trial]
+            change = f"from {each.old} to {each.new}"
+            notes[mended].append(f"This verdict was mended after trial {number}: {change}.")
+            if mended != number:
+                notes[number].append(f"The verdict of trial {mended} was mended after this one: {change}.")
+    return [replace(page, notes=(*page.notes, *more)) for page, more in zip(pages, notes, strict=True)]
 
 
 class Retelling:
@@ -87,7 +111,8 @@ class Retelling:
             looks = self._with_beliefs(looks, parameters, by_entropy=by_entropy)
         met = "met before" if self.score.has_met(trial.object) else "never met before"
         truth = f"{told_truth(trial.truths[-1], self.score.name_of(trial.object))}, {met}"
-        page = TrialPage(title, told_verdict(trial.verdict, trial.matched), truth, None, (), ())
+        notes = told_mistakes(trial, self._assumptions)
+        page = TrialPage(title, told_verdict(trial.verdict, trial.matched), truth, None, (), (), notes=notes)
         page = with_graphs(page, looks, self._memory if self.inferred else None, self._assumptions, trial.matched)
         before = self.score.successes
         self.score.add(trial, learn_from(trial, self._memory))

@@ -16,7 +16,7 @@ from atg_fg.core.memory import RobotMemory
 from atg_fg.core.records import StepSummary
 from atg_fg.report.content import Look, Named, Report, TrialPage, shown_parameters
 from atg_fg.report.pictures import data_address
-from atg_fg.report.summaries import look_of, told_truth, told_verdict, with_graphs
+from atg_fg.report.summaries import look_of, told_mistakes, told_truth, told_verdict, with_graphs
 from atg_fg.storage.checked_json import check_format, parse_json, read_info, read_list, read_object
 from atg_fg.storage.memory_json import read_assumptions
 from atg_fg.storage.trial_log import read_step, summary_of
@@ -62,7 +62,12 @@ def read_trial_record(text: str, path: Path, memory: RobotMemory | None) -> Repo
     end = _holding(_holding(last, place, "verdict")["verdict"], f"{place}: verdict", "outcome", "matched", "truth")
     lost = end["truth"] if end["outcome"] == "lost" else None
     trial = summary_of(
-        {"verdict": end["outcome"], "matched": end["matched"], "lost_truth": lost},
+        {
+            "verdict": end["outcome"],
+            "matched": end["matched"],
+            "lost_truth": lost,
+            "mistakes": end.get("mistakes", []),
+        },
         [step for step, _ in looks],
         f"{place}: verdict",
     )
@@ -74,6 +79,7 @@ def read_trial_record(text: str, path: Path, memory: RobotMemory | None) -> Repo
         right=None if names else trial.verdict == "novel",
         looks=(),
         graphs=(),
+        notes=told_mistakes(trial, assumptions),
     )
     page = with_graphs(page, [look for _, look in looks], memory, assumptions, trial.matched)
     notes = () if memory is not None or not names else (_NO_MEMORY,)

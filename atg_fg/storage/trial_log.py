@@ -14,7 +14,7 @@ from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.checks import number, one_of, plain_text, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import Detection, Evidence
-from atg_fg.core.records import VERDICTS, StepSummary, TrialSummary
+from atg_fg.core.records import VERDICTS, Mended, Mistake, StepSummary, TrialSummary
 from atg_fg.storage.checked_json import read_info, read_list, read_object, without_none
 from atg_fg.storage.growing_file import GrowingFile, read_lines
 
@@ -39,6 +39,8 @@ def to_line(trial: TrialSummary) -> dict[str, Any]:
             "purpose": purposes if any(purposes) else None,
             "truth": list(trial.truths),
             "learned": None if patterns is None else list(patterns),
+            "mistakes": [list(each) for each in trial.mistakes] or None,
+            "mended": [list(each) for each in trial.mended] or None,
         },
         but_for=("matched",),
     )
@@ -55,7 +57,7 @@ def from_line(line: Any, place: str, assumptions: Assumptions | None = None) -> 
     Raises:
         InvalidInputError: Anything in it is not as it should be.
     """
-    fields = read_object(line, place, _KEYS, optional=("purpose", "learned"))
+    fields = read_object(line, place, _KEYS, optional=("purpose", "learned", "mistakes", "mended"))
     looks = len(read_list(fields["observed"], f"{place}: observed"))
     lost = fields["verdict"] == "lost"
     actions = list(read_list(fields["actions"], f"{place}: actions"))
@@ -118,7 +120,8 @@ def summary_of(
     """Return a trial of these looks.
 
     Args:
-        fields: ``verdict``, and what there is of ``matched``, ``lost_truth`` and ``learned``, the patterns learned.
+        fields: ``verdict``, and what there is of ``matched``, ``lost_truth``, ``learned`` (the patterns learned),
+            ``mistakes`` and ``mended``.
         steps: The looks.
         place: As for ``from_line``.
         assumptions: As for ``from_line``.
@@ -151,7 +154,33 @@ def summary_of(
         tuple(steps),
         None if lost_truth is None else _truth(lost_truth, f"{place}: truth[{len(steps)}]"),
         learned_patterns=learned,
+        mistakes=read_mistakes(fields.get("mistakes", []), steps, f"{place}: mistakes"),
+        mended=_read_mended(fields.get("mended", []), f"{place}: mended"),
     )
+
+
+def read_mistakes(value: Any, steps: Sequence[StepSummary], place: str) -> tuple[Mistake, ...]:
+    """Return the labels of these looks that were taken for wrong; errors are those of ``from_line``."""
+    mistakes = []
+    for index, entry in enumerate(read_list(value, place)):
+        where = f"{place}[{index}]"
+        look, slot, probability = _column(entry, where, 3)
+        look = whole_number(look, f"{where}[0]", 0, len(steps) - 1)
+        slot = whole_number(slot, f"{where}[1]", 0, len(steps[look].observed) - 1)
+        if steps[look].observed[slot] is None:
+            raise InvalidInputError(f"{where}: slot {slot} of look {look}, where nothing was seen; expected a label")
+        mistakes.append(Mistake(look, slot, number(probability, f"{where}[2]", 0.0, 1.0, slack=_SLACK)))
+    return tuple(mistakes)
+
+
+def _read_mended(value: Any, place: str) -> tuple[Mended, ...]:
+    mended = []
+    for index, entry in enumerate(read_list(value, place)):
+        where = f"{place}[{index}]"
+        trial, old, new = _column(entry, where, 3)
+        names = [plain_text(name, f"{where}[{position}]") for position, name in ((1, old), (2, new))]
+        mended.append(Mended(whole_number(trial, f"{where}[0]", 0), *names))
+    return tuple(mended)
 
 
 def _column(value: Any, place: str, length: int) -> list[Any]:

@@ -30,7 +30,8 @@ def to_json_lines(record: TrialRecord, frames: Sequence[str] = (), **header: Any
     for line, frame in zip(lines[1:], frames, strict=False):
         line["frame"] = frame
     verdict = {"outcome": record.verdict, "judged_novel": record.judged_novel, "matched": record.matched}
-    lines.append({"verdict": {**verdict, "truth": record.lost_truth or record.steps[-1].truth}})
+    mistakes = {"mistakes": [list(each) for each in record.mistakes]} if record.mistakes else {}
+    lines.append({"verdict": {**verdict, **mistakes, "truth": record.lost_truth or record.steps[-1].truth}})
     return "".join(json.dumps(line, default=plain_json, allow_nan=False) + "\n" for line in lines)
 
 

@@ -178,6 +178,26 @@ def test_a_belief_that_does_not_lead_to_what_was_recorded_is_not_shown(test_log,
     assert "not inferred again" in report.notes[0]
 
 
+def test_probable_mistakes_and_mended_verdicts_are_told(test_log, record, tmp_path):
+    lines = [json.loads(line) for line in gzip.decompress(test_log.read_bytes()).splitlines()]
+    lines[5]["mistakes"] = [[4, 0, 0.934]]  # the first line is the header
+    lines[9]["mended"] = [[2, "object-001", "object-000"]]
+    other = tmp_path / "test-0003.jsonl.gz"
+    other.write_bytes(b"".join(gzip.compress(json.dumps(line).encode() + b"\n") for line in lines))
+    pages = read_report(other).trials
+    assert pages[4].notes == ("Look 4, front, was probably a mistake: 93%.",)
+    assert pages[2].notes == ("This verdict was mended after trial 8: from object-001 to object-000.",)
+    assert pages[8].notes == ("The verdict of trial 2 was mended after this one: from object-001 to object-000.",)
+    assert not any(page.notes for number, page in enumerate(pages) if number not in (2, 4, 8))
+    lines[9]["mended"] = [[9, "object-001", "object-000"]]
+    other.write_bytes(b"".join(gzip.compress(json.dumps(line).encode() + b"\n") for line in lines))
+    with pytest.raises(InvalidInputError, match="trial 8: mended: 9; expected less than 9"):
+        read_report(other)
+    changed(record, lambda lines: lines[-1]["verdict"].update(mistakes=[[1, 1, 0.8]]))
+    (page,) = read_report(record).trials
+    assert page.notes == ("Look 1, top, was probably a mistake: 80%.",)
+
+
 def test_whether_a_trial_was_right_is_by_the_truth():
     report = read_report(RESULTS / "robonaut" / "worn_default" / "test-0000.jsonl.gz")
     result = json.loads((RESULTS / "table1_robonaut_worn_default.json").read_text())

@@ -1,5 +1,6 @@
 import gzip
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -7,12 +8,12 @@ import pytest
 from atg_fg.core.assumptions import arcube_assumptions
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
-from atg_fg.core.records import TrialSummary
+from atg_fg.core.records import Mended, Mistake, TrialSummary
 from atg_fg.engines import begin_trial
 from atg_fg.experiments.trial import run_trial
 from atg_fg.policies import RandomPolicy
 from atg_fg.storage.presets import preset
-from atg_fg.storage.trial_log import TrialLog, read_log, to_line
+from atg_fg.storage.trial_log import TrialLog, from_line, read_log, to_line
 from atg_fg.worlds.registry import make_world
 
 HEADER = {"seed": 3, "world": "ideal"}
@@ -51,6 +52,23 @@ def test_what_is_read_back_is_what_was_written(path, records):
     assert lines_of(found) == lines_of(map(TrialSummary.of, records))
     assert [trial.patterns for trial in found] == [tuple(record.patterns) for record in records]
     assert [trial.object for trial in found] == [record.steps[0].truth["object"] for record in records]
+
+
+def test_mistakes_and_mended_verdicts_are_read_back_and_checked(records):
+    trial = replace(TrialSummary.of(records[0]), mistakes=(Mistake(2, 1, 0.93),), mended=(Mended(0, "a", "b"),))
+    (line,) = lines_of([trial])
+    found = from_line(line, "here", ASSUMPTIONS)
+    assert (found.mistakes, found.mended) == (trial.mistakes, trial.mended)
+    for key, value, message in (
+        ("mistakes", [[5, 0, 0.9]], r"here: mistakes\[0\]\[0\]: 5; expected"),
+        ("mistakes", [[0, 2, 0.9]], r"here: mistakes\[0\]\[1\]: 2; expected"),
+        ("mistakes", [[0, 0, 1.5]], r"here: mistakes\[0\]\[2\]: 1.5; expected"),
+        ("mistakes", [[0, 0]], r"here: mistakes\[0\]: 2 entries; expected 3"),
+        ("mended", [[-1, "a", "b"]], r"here: mended\[0\]\[0\]: -1; expected"),
+        ("mended", [[0, "a", 3]], r"here: mended\[0\]\[2\]: 3; expected"),
+    ):
+        with pytest.raises(InvalidInputError, match=message):
+            from_line({**line, key: value}, "here", ASSUMPTIONS)
 
 
 def test_the_file_is_plain_gzip_with_a_line_a_trial(path, records):

@@ -97,6 +97,8 @@ function drawTrial(index) {
   trial = data.trials[index];
   show("legend", graphLegend(data, trial));
   show("looks", looksTable());
+  show("notes", trial.notes.map((note) => element("li", {}, note)));
+  document.getElementById("notes").hidden = trial.notes.length === 0;
   slider.max = trial.looks.length - 1;
   slider.value = 0;
   drawLook();
