@@ -54,8 +54,8 @@ def test_what_is_read_back_is_what_was_written(path, records):
     assert [trial.object for trial in found] == [record.steps[0].truth["object"] for record in records]
 
 
-def test_mistakes_and_mended_verdicts_are_read_back_and_checked(records):
-    trial = replace(TrialSummary.of(records[0]), mistakes=(Mistake(2, 1, 0.93),), mended=(Mended(0, "a", "b"),))
+def test_mistakes_and_mended_verdicts_are_read_back_and_checked():
+    trial = replace(TrialSummary.of(a_record(9)), mistakes=(Mistake(2, 1, 0.93),), mended=(Mended(0, "a", "b"),))
     (line,) = lines_of([trial])
     found = from_line(line, "here", ASSUMPTIONS)
     assert (found.mistakes, found.mended) == (trial.mistakes, trial.mended)

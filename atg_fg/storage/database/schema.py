@@ -67,8 +67,14 @@ _VERSION_3: Final = (
 )
 
 
+_VERSION_4: Final = (
+    "ALTER TABLE trials ADD COLUMN mistakes TEXT",
+    "ALTER TABLE trials ADD COLUMN mended TEXT",
+)
+
+
 #: The statements of each step: the first makes the tables of version 1, the n-th leads from version n − 1 to n.
-MIGRATIONS: tuple[tuple[str, ...], ...] = (_VERSION_1, _VERSION_2, _VERSION_3)
+MIGRATIONS: tuple[tuple[str, ...], ...] = (_VERSION_1, _VERSION_2, _VERSION_3, _VERSION_4)
 
 
 def version_of(connection: sqlite3.Connection, place: str) -> int:

@@ -41,8 +41,9 @@ def add_trial(connection: sqlite3.Connection, trial: TrialSummary, experiment: i
         "SELECT coalesce(max(number) + 1, 0) FROM trials WHERE experiment IS ?", (experiment,)
     ).fetchone()
     row = connection.execute(
-        "INSERT INTO trials (experiment, number, verdict, matched, learned, learned_patterns, lost_truth)"
-        " VALUES (?, ?, ?, ?, ?, ?, ?)",
+        "INSERT INTO trials"
+        " (experiment, number, verdict, matched, learned, learned_patterns, lost_truth, mistakes, mended)"
+        " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
         (
             experiment,
             number,
@@ -51,6 +52,8 @@ def add_trial(connection: sqlite3.Connection, trial: TrialSummary, experiment: i
             trial.learned,
             _optional(trial.learned_patterns),
             _optional(trial.lost_truth),
+            _optional(trial.mistakes or None),
+            _optional(trial.mended or None),
         ),
     )
     rows = (
@@ -213,9 +216,9 @@ def canonical(value: Any) -> str:
 
 
 def _trial(connection: sqlite3.Connection, key: int, place: str, assumptions: Assumptions | None) -> TrialSummary:
-    columns = "experiment, number, verdict, matched, learned, learned_patterns, lost_truth"
+    columns = "experiment, number, verdict, matched, learned, learned_patterns, lost_truth, mistakes, mended"
     row = _row(connection, f"SELECT {columns} FROM trials WHERE id = ?", key, place)
-    experiment, number, verdict, matched, learned, patterns, lost = row
+    experiment, number, verdict, matched, learned, patterns, lost, mistakes, mended = row
     steps = []
     question = f"SELECT number, {', '.join(_STEP)} FROM steps WHERE trial = ? ORDER BY number"
     for index, step in enumerate(_rows(connection, question, key, place)):
@@ -231,6 +234,8 @@ def _trial(connection: sqlite3.Connection, key: int, place: str, assumptions: As
             "matched": matched,
             "learned": _document(patterns, f"{place}: learned_patterns"),
             "lost_truth": _document(lost, f"{place}: lost_truth"),
+            **({} if mistakes is None else {"mistakes": _document(mistakes, f"{place}: mistakes")}),
+            **({} if mended is None else {"mended": _document(mended, f"{place}: mended")}),
         },
         steps,
         place,

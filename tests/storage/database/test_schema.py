@@ -33,7 +33,7 @@ def pragma(path, name):
 
 def test_a_new_file_has_the_version_of_all_steps(tmp_path):
     open_memory(tmp_path / "robot.db", ARCUBES).close()
-    assert pragma(tmp_path / "robot.db", "user_version") == len(schema.MIGRATIONS) == 3
+    assert pragma(tmp_path / "robot.db", "user_version") == len(schema.MIGRATIONS) == 4
     assert pragma(tmp_path / "robot.db", "application_id") == schema.APPLICATION_ID
     assert pragma(tmp_path / "robot.db", "journal_mode") == "wal"
 
@@ -48,7 +48,7 @@ def test_an_older_file_is_read_as_it_is_and_led_on_when_it_is_written(old):
         assert opened == memory
         assert len(list(opened.trials())) == 2
         add_cube(opened, 5)
-    assert pragma(old, "user_version") == 4
+    assert pragma(old, "user_version") == len(schema.MIGRATIONS)
     with closing(sqlite3.connect(old)) as connection:
         assert connection.execute("SELECT note FROM trials").fetchall() == [("novel",), ("novel",)]
     assert memory_files.load_memory(old) == opened
@@ -69,6 +69,6 @@ def test_a_file_of_a_later_version_is_refused_and_left_alone(old):
         connection.execute("PRAGMA user_version = 9")
     before = old.read_bytes()
     for use in (memory_files.load_memory, open_memory):
-        with pytest.raises(InvalidInputError, match="schema version 9, of a later atg-fg; expected at most 3"):
+        with pytest.raises(InvalidInputError, match="schema version 9, of a later atg-fg; expected at most 4"):
             use(old)
     assert old.read_bytes() == before
