@@ -19,26 +19,30 @@ from atg_fg.core.records import TrialRecord, TrialStep
 from atg_fg.display import figures, trial_plots
 from atg_fg.display.frames import FrameFolder, has_camera
 from atg_fg.engines import begin_trial, check_engine
-from atg_fg.experiments.exploration import learned_memory
+from atg_fg.experiments.exploration import explore, learned_memory
 from atg_fg.experiments.trial import learn_from, run_trial
+from atg_fg.learning.structured_memory import memory_for
 from atg_fg.policies import EntropyPolicy, RandomPolicy
 from atg_fg.storage import memory_files, plain_files
 from atg_fg.storage.presets import preset as preset_named
 from atg_fg.storage.trial_record import to_json_lines
 from atg_fg.worlds.arcube import Cube, make_arcubes
 from atg_fg.worlds.base import World
-from atg_fg.worlds.registry import check_arcube_world, make_world
+from atg_fg.worlds.registry import assumptions_of, check_arcube_world, make_world, sense_of
 
 N_REMEMBERED = 6
+#: The world of boxes without tags, in which the robot itself learns what it remembers.
+PICTURE_BOXES: Final = "picture-box"
 #: Options of the worlds that have a camera: its last frame is saved, or a film of the trial.
 CAMERAS: Final[dict[str, dict[str, Any]]] = {
     "rendered": {"render_mode": "detections", "image_size": (640, 480)},
     "robonaut": {"render_mode": "rgb_array_list"},
+    PICTURE_BOXES: {"render_mode": "detections"},
 }
 
 
 def demo(
-    world: options.ARcubeWorld = "robonaut",
+    world: options.DemoWorld = "robonaut",
     engine: options.PresetsEngine = None,
     preset: options.Preset = "default",
     actions: options.Actions = 8,
@@ -53,12 +57,13 @@ def demo(
 ) -> None:
     """Let the robot recognise one of the objects it remembers by turning it over, told step by step.
 
-    The memory is learned beforehand, from the same objects turned at random in the ideal world. With a camera, the last
-    frame is saved, or a film of the robot.
+    The memory is learned beforehand, from the same objects turned at random in the ideal world, or in that of boxes
+    without tags. With a camera, the last frame is saved, or a film of the robot.
 
     Example: atg-fg demo --seed 1 --novel
     """
-    check_arcube_world("--world", world)
+    if world != PICTURE_BOXES:
+        check_arcube_world("--world", world)
     options.check_json_option(json_file)
     parameters = preset_named(preset)
     engine = options.engine_of(engine, parameters, "gtsam")
@@ -67,12 +72,20 @@ def demo(
     console = options.console(json_file)
     learn_seed, trial_seed = np.random.SeedSequence(seed).spawn(2)
     check_engine(engine, parameters)
-    # The last cube is the one the robot never meets while it learns.
-    cubes = make_arcubes(N_REMEMBERED + 1, seed)
-    console.print(f"The robot remembers {N_REMEMBERED} cubes that it turned over before.")
-    memory = learn_beforehand(cubes, parameters, np.random.default_rng(learn_seed))
     world_options = {**CAMERAS.get(world, {}), **options.world_options(condition=condition, urdf=urdf)}
-    with closing(make_world(world, cubes=cubes, **world_options)) as made_world:
+    # The last object is the one the robot never meets while it learns.
+    cubes = make_arcubes(N_REMEMBERED + 1, seed)
+    own: dict[str, Any] = {"n_objects": len(cubes), "objects_seed": seed}
+    with closing(
+        make_world(world, **(own if world == PICTURE_BOXES else {"cubes": cubes}), **world_options)
+    ) as made_world:
+        things = "boxes" if world == PICTURE_BOXES else "cubes"
+        console.print(f"The robot remembers {N_REMEMBERED} {things} that it turned over before.")
+        rng = np.random.default_rng(learn_seed)
+        if world == PICTURE_BOXES:
+            memory = learn_boxes_beforehand(made_world, parameters, rng)
+        else:
+            memory = learn_beforehand(cubes, parameters, rng)
         rng = np.random.default_rng(trial_seed)
         presented = N_REMEMBERED if novel else int(rng.integers(N_REMEMBERED))
         story = Story(console, memory)
@@ -108,6 +121,14 @@ def demo(
         "truth": truth,
     }
     options.write_json({**document, "saved": saved}, json_file)
+
+
+def learn_boxes_beforehand(world: World, parameters: ModelParameters, rng: np.random.Generator) -> RobotMemory:
+    """Return the memory of a robot that turned each of the first six boxes of a world over at random, twelve times."""
+    empty = RobotMemory(assumptions_of(world, N_REMEMBERED + 1), sense=sense_of(world))
+    memory = memory_for(parameters, empty)
+    explore(memory, world, N_REMEMBERED, RandomPolicy(), 12, rng)
+    return memory
 
 
 def learn_beforehand(cubes: Sequence[Cube], parameters: ModelParameters, rng: np.random.Generator) -> RobotMemory:

@@ -40,6 +40,13 @@ MemoryFile = Annotated[Path, typer.Argument(help="A memory: JSON, or a database.
 World = Annotated[
     str, typer.Option(help=f"World: {', '.join(WORLDS)}, or module:namespace/Id-v0 of your own.", rich_help_panel=WORLD)
 ]
+DemoWorld = Annotated[
+    str,
+    typer.Option(
+        help=f"World of ARcubes: {', '.join(ARCUBE_WORLDS)}, or module:namespace/Id-v0 of your own; or picture-box.",
+        rich_help_panel=WORLD,
+    ),
+]
 ARcubeWorld = Annotated[
     str,
     typer.Option(

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol, Self, TypeAlias
 
-from atg_fg.core.patterns import Detection, Evidence
+from atg_fg.core.patterns import Detection, Evidence, SlotLikelihoods
 
 #: What was measured in one slot, ``None`` where nothing was seen.
 Reading: TypeAlias = tuple[float, ...] | None
@@ -20,8 +20,8 @@ class SensedLook(NamedTuple):
     """What a sense makes of one look.
 
     Attributes:
-        evidence: The likelihood of each pattern; its detection is the most probable class in each slot, ``None`` where
-            none is probable enough, with its probability as confidence.
+        evidence: The likelihood of each pattern; its detection is the most probable class in each slot, with its
+            probability as confidence. Where none is probable enough, its ``slots`` have the likelihood of each.
         readings: What it was made from.
     """
 
@@ -82,6 +82,15 @@ class Sense(Protocol):
         """Return a sense that can learn without touching this one."""
 
     def __eq__(self, other: object) -> bool: ...
+
+
+def likelihoods_of(looks: Sequence[dict[str, Any]]) -> tuple[SlotLikelihoods, ...]:
+    """Return the likelihoods of slots that a sense was not sure of, in the ``info`` of each look; empty if none."""
+    found = tuple(
+        tuple(None if slot is None else tuple(map(float, slot)) for slot in look.get("likelihoods") or ())
+        for look in looks
+    )
+    return found if any(found) else ()
 
 
 def readings_of(looks: Sequence[dict[str, Any]]) -> tuple[Readings, ...]:

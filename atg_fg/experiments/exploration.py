@@ -12,11 +12,13 @@ from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.records import TrialSummary
 from atg_fg.engines import begin_trial
-from atg_fg.experiments.trial import run_trial
+from atg_fg.experiments.trial import learn_steps, run_trial
 from atg_fg.learning.structured_memory import memory_for
 from atg_fg.policies import Policy
 from atg_fg.worlds.arcube import ORIENTATIONS, SUCCESSORS, Cube, shown_pattern
+from atg_fg.worlds.base import World
 from atg_fg.worlds.registry import make_world
 
 _PLAIN: Final = ModelParameters()
@@ -46,13 +48,28 @@ def learned_memory(
     """
     memory = memory_for(parameters, RobotMemory(assumptions))
     with closing(make_world(world, cubes=cubes)) as made_world:
-        for number in range(len(cubes)):
-            # The memory is empty: what else the robot remembers does not matter while it explores a new object.
-            inference = begin_trial("bayes-filter", RobotMemory(assumptions), _PLAIN)
-            record = run_trial(made_world, inference, policy, n_actions, rng, reset_options={"object": number})
-            name = memory.learn(record.patterns, record.actions, matched=None)
-            memory.learn_shared(name, record.detections, record.actions, record.confidences)
+        explore(memory, made_world, len(cubes), policy, n_actions, rng)
     return memory
+
+
+def explore(
+    memory: RobotMemory, world: World, n_objects: int, policy: Policy, n_actions: int, rng: np.random.Generator
+) -> None:
+    """Let a memory learn the first objects of a world, each from one trial, knowing that it is new.
+
+    Args:
+        memory: What learns.
+        world: Where the objects are.
+        n_objects: How many of them.
+        policy: Chooses the actions.
+        n_actions: On each object.
+        rng: Of all these trials.
+    """
+    for number in range(n_objects):
+        # The memory is empty: what else the robot remembers does not matter while it explores a new object.
+        inference = begin_trial("bayes-filter", RobotMemory(memory.assumptions, sense=memory.sense), _PLAIN)
+        record = run_trial(world, inference, policy, n_actions, rng, reset_options={"object": number})
+        learn_steps(memory, TrialSummary.of(record), None)
 
 
 def complete_memory(assumptions: Assumptions, cubes: Sequence[Cube]) -> RobotMemory:

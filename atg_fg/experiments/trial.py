@@ -12,7 +12,7 @@ from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.patterns import Evidence
 from atg_fg.core.records import TrialRecord, TrialStep, TrialSummary, confidences_in
-from atg_fg.core.sense import Sense, SenseTrial, readings_of
+from atg_fg.core.sense import Sense, SenseTrial, likelihoods_of, readings_of
 from atg_fg.inference.interface import Inference
 from atg_fg.policies import Policy
 from atg_fg.worlds.base import World, detection_of
@@ -64,7 +64,8 @@ def sensed_look(
     if senses is None:
         return Evidence.of_detection(assumptions.alphabet, detection_of(observation), confidences_in(info)), info
     evidence, readings = senses.look(observation)
-    return evidence, {**info, "confidences": evidence.confidences, "readings": readings}
+    unsure = {"likelihoods": evidence.slots} if evidence.slots else {}
+    return evidence, {**info, "confidences": evidence.confidences, "readings": readings, **unsure}
 
 
 def run_trial(
@@ -143,12 +144,25 @@ def learn_from(record: TrialRecord | TrialSummary, memory: RobotMemory) -> str |
     with memory.transaction():
         name = None
         if can_be_learned(trial):
-            actions = [memory.assumptions.action_index(action) for action in trial.actions[: len(trial.steps) - 1]]
-            name = memory.learn(list(trial.patterns), actions, trial.matched)
-            name = memory.learn_shared(name, trial.detections, actions, trial.confidences)
-            readings = readings_of([step.truth for step in trial.steps])
-            if readings and memory.sense is not None:
-                memory.learn_readings(name, readings, trial.detections, actions)
+            name = learn_steps(memory, trial, trial.matched)
         if isinstance(record, TrialRecord):
             memory.add_record(record, name)
+    return name
+
+
+def learn_steps(memory: RobotMemory, trial: TrialSummary, matched: str | None) -> str:
+    """Let a memory learn from the looks and actions of a trial; return the name of the ATG.
+
+    Args:
+        memory: What learns.
+        trial: What was seen and done.
+        matched: Name of the ATG that the object is of, ``None`` if it is new.
+    """
+    actions = [memory.assumptions.action_index(action) for action in trial.actions[: len(trial.steps) - 1]]
+    looks = [step.truth for step in trial.steps]
+    name = memory.learn(list(trial.patterns), actions, matched)
+    name = memory.learn_shared(name, trial.detections, actions, trial.confidences, likelihoods_of(looks))
+    readings = readings_of(looks)
+    if readings and memory.sense is not None:
+        memory.learn_readings(name, readings, trial.detections, actions)
     return name

@@ -7,6 +7,7 @@ from typing import Any, Final
 
 import numpy as np
 from gymnasium import spaces
+from numpy.typing import ArrayLike
 
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import MISSING, Detection, Evidence, FloatArray, IntArray, PatternAlphabet
@@ -59,6 +60,15 @@ class AppearanceSense:
     def begin(self) -> AppearanceTrial:
         """Return a copy for one trial; the sense itself learns at its end."""
         return AppearanceTrial(self.space, self.alphabet, self.codebook.copy())
+
+    def symbol_of(self, features: ArrayLike) -> int | None:
+        """Return the class that a picture with these features is of, ``None`` if it is of none that was met for sure.
+
+        Of a crop that is no look of a trial, such as that of a goal.
+        """
+        belief = self.codebook.posterior(self.space.encode(features))
+        best = int(belief.classes.argmax())
+        return best if belief.classes[best] >= SURE else None
 
     def check_space(self, space: Any) -> None:
         """Raise ``InvalidInputError`` unless these are observations that the sense can read."""
@@ -183,12 +193,15 @@ class AppearanceTrial:
         likelihood = np.ones(len(self.alphabet))
         detection: list[int | None] = []
         confidences: list[float | None] = []
+        unsure: list[tuple[float, ...] | None] = []
         for slot, reading in enumerate(readings):
             weights, symbol, confidence = self._symbol(reading)
             likelihood *= weights[self.alphabet.symbols[:, slot]]
             detection.append(symbol)
             confidences.append(confidence)
-        evidence = Evidence(likelihood, self._pattern(detection), tuple(detection), tuple(confidences))
+            unsure.append(tuple(weights.tolist()) if symbol is None and reading is not None else None)
+        slots = tuple(unsure) if any(unsure) else ()
+        evidence = Evidence(likelihood, self._pattern(detection), tuple(detection), tuple(confidences), slots)
         return SensedLook(evidence, readings)
 
     def _symbol(self, reading: Reading) -> tuple[FloatArray, int | None, float | None]:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable
-from typing import Final
+from typing import Any, Final
 
 import cv2
 import numpy as np
@@ -72,16 +72,21 @@ def find_box(
     return None if misfit > _MOST_MISFIT * scale or (np.abs(pose) >= _FARTHEST).any() else pose
 
 
+def lightness(frame: NDArray[Any], empty: NDArray[Any]) -> float:
+    """Return how light a frame is beside a picture of the empty table, by its border, where no box is."""
+    rows, columns = frame.shape[0] // 12, frame.shape[1] // 8
+    border = np.ones(frame.shape[:2], dtype=bool)
+    border[rows:-rows, columns:-columns] = False
+    return float(np.median(frame[border].sum(axis=1) / empty[border].sum(axis=1)))
+
+
 def _measured_support(frame: NDArray[np.uint8], empty: NDArray[np.float32]) -> FloatArray | None:
     """Return how far what is not table reaches in each direction, pixels; ``None`` if there is nothing."""
     # Half the size is as exact once noise is averaged, and four times as quick.
     half = (frame.shape[1] // 2, frame.shape[0] // 2)
     small, table = (cv2.resize(each, half, interpolation=cv2.INTER_AREA).astype(np.float32) for each in (frame, empty))
     seen = cv2.GaussianBlur(small, (0, 0), 0.8)
-    # Most of the image may be box; its border is not, and says how light it is now.
-    border = np.ones(half[::-1], dtype=bool)
-    border[half[1] // 12 : -half[1] // 12, half[0] // 8 : -half[0] // 8] = False
-    light = float(np.median(seen[border].sum(axis=1) / table[border].sum(axis=1)))
+    light = lightness(seen, table)
     differs = (np.abs(seen - light * table).sum(axis=2) > _DIFFERENCE * max(light, 0.5)).astype(np.uint8)
     differs = np.asarray(cv2.morphologyEx(differs, cv2.MORPH_OPEN, np.ones((3, 3), dtype=np.uint8)))
     n_parts, parts, sizes, _ = cv2.connectedComponentsWithStats(differs)

@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from atg_fg.core.patterns import FloatArray
 from atg_fg.senses.face_features import check_image, rectified
+from atg_fg.senses.tag_drawing import SLOT_COLOURS
 from atg_fg.worlds.arcube import FACE_NORMALS, FRONT, TOP
 from sim.bodies.cube import CUBE_CENTRE, CUBE_SIZE, FACE_UPS
-from sim.vision.box_pose import find_box, turned
+from sim.vision.box_pose import find_box, lightness, turned
 from sim.vision.camera import Camera, Light
 from sim.vision.image_noise import at_least_zero
 
@@ -107,8 +108,16 @@ class PictureBoxCamera:
             frame = frame + rng.normal(0.0, self.image_noise, (*frame.shape[:2], 1)).astype(np.float32)
         return np.clip(np.round(frame), 0, 255).astype(np.uint8)
 
-    def crops(self, frame: NDArray[np.uint8]) -> NDArray[np.uint8]:
-        """Return what is in front and on top, as if seen from straight ahead, shape [2, side, side, 3].
+    def outlined(self, frame: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Return a copy of a frame in which the faces are outlined that are taken for those in front and on top."""
+        drawn = frame.copy()
+        for slot, corners in zip(("front", "top"), self.faces(frame), strict=True):
+            colour = SLOT_COLOURS[slot]
+            cv2.polylines(drawn, [np.round(corners).astype(np.int32)], True, colour, 2, cv2.LINE_AA)
+        return drawn
+
+    def faces(self, frame: NDArray[np.uint8]) -> list[FloatArray]:
+        """Return the corners of what is in front and on top, clockwise, each of shape [4, 2], pixels.
 
         Where the box stands is told from its outline; if that does not look like one, it is taken to stand where it
         should.
@@ -120,8 +129,19 @@ class PictureBoxCamera:
         pose = find_box(frame, self.empty, self.project)
         x, y, yaw = np.zeros(3) if pose is None else pose
         centre = np.add(CUBE_CENTRE, (x, y, 0.0))
-        faces = [self.project(_corners(place, turned(float(yaw)), centre)) for place in (FRONT, TOP)]
-        return np.array([rectified(frame, face) for face in faces])
+        return [self.project(_corners(place, turned(float(yaw)), centre)) for place in (FRONT, TOP)]
+
+    def crops(self, frame: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """Return what is in front and on top, as if seen from straight ahead, shape [2, side, side, 3].
+
+        How light it is now is told from the table, and evened out.
+
+        Raises:
+            InvalidInputError: A frame of another size or type.
+        """
+        faces, light = self.faces(frame), lightness(frame, self.empty)
+        usual = np.clip(np.round(frame / np.float32(light)), 0, 255).astype(np.uint8)
+        return np.array([rectified(usual, face) for face in faces])
 
 
 def _corners(face: int, rotation: FloatArray, centre: FloatArray) -> FloatArray:
