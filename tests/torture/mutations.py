@@ -239,7 +239,7 @@ def _damaged_document(rng: random.Random, content: bytes) -> bytes:
         elif change == 4 and isinstance(holder, list):
             holder[key:key] = [_copy(holder[key]) for _ in range(rng.choice((1, 2, 100)))]
         else:
-            other = rng.choice(holders)
+            other = rng.choice(holders or [[0]])
             holder[key] = _copy(other)
         if not isinstance(document, (dict, list)) or not document:
             break
