@@ -15,7 +15,7 @@ from atg_fg.core.records import TrialRecord, TrialStep, TrialSummary, confidence
 from atg_fg.core.sense import Sense, SenseTrial, likelihoods_of, readings_of
 from atg_fg.inference.interface import Inference
 from atg_fg.policies import Policy
-from atg_fg.worlds.base import World, detection_of
+from atg_fg.worlds.base import World, detection_of, symbols_of
 from atg_fg.worlds.registry import assumptions_of, sense_of
 
 
@@ -31,15 +31,15 @@ def check_world(world: World, assumptions: Assumptions, sense: Sense | None = No
     if of_world is not None and of_world.features != (None if sense is None else sense.features):
         have = "without a sense" if sense is None else f"of {sense.features!r}"
         raise InvalidInputError(f"world: features {of_world.features!r}, memory {have}; expected the same features")
-    symbols = [assumptions.alphabet.n_symbols + 1] * len(assumptions.alphabet.slots)
-    expected = (len(assumptions.actions), symbols if sense is None else [])
-    found = (getattr(world.action_space, "n", None), list(getattr(world.observation_space, "nvec", [])))
+    n_actions, n_slots = len(assumptions.actions), len(assumptions.alphabet.slots)
+    n_symbols = assumptions.alphabet.n_symbols
     if sense is not None:
         sense.check_space(world.observation_space)
-    if (int(found[0] or 0), [int(size) for size in found[1]]) != expected:
+    symbols = [n_symbols] * n_slots if sense is None else []
+    if (getattr(world.action_space, "n", 0), symbols_of(world.observation_space)) != (n_actions, symbols):
         raise InvalidInputError(
-            f"world: {world.action_space} and {world.observation_space}; expected {expected[0]} actions and "
-            f"{expected[1]} symbols, counting 'missing', in the slots"
+            f"world: {world.action_space} and {world.observation_space}; expected {n_actions} actions and looks of "
+            f"{n_slots} slots with numbers from -1, missing, to {n_symbols - 1}"
         )
     stated = assumptions_of(world, assumptions.n_objects) if world.has_wrapper_attr("assumptions") else assumptions
     for place, ours, theirs in (

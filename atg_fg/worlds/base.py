@@ -20,6 +20,26 @@ def detection_of(observation: IntArray) -> Detection:
     return tuple(None if symbol == MISSING else int(symbol) for symbol in observation)
 
 
+def looks_space(n_slots: int, n_symbols: int) -> spaces.Box:
+    """Return the space of looks: in each slot a symbol's number, or ``MISSING``.
+
+    It is a box of whole numbers: what trains on environments takes ``MultiDiscrete`` to begin at zero.
+    """
+    return spaces.Box(MISSING, n_symbols - 1, (n_slots,), np.int64)
+
+
+def symbols_of(space: Any) -> list[int]:
+    """Return how many symbols each slot may show in a space of looks; none if it is something else.
+
+    A world of a user's own may have whole numbers in a ``Box``, or a ``MultiDiscrete`` that counts ``MISSING``.
+    """
+    if isinstance(space, spaces.MultiDiscrete) and space.nvec.ndim == 1:
+        return [int(size) - 1 for size in space.nvec]
+    if isinstance(space, spaces.Box) and len(space.shape) == 1 and np.issubdtype(space.dtype, np.integer):
+        return [int(most) + 1 for most in space.high] if (space.low == MISSING).all() else []
+    return []
+
+
 def probability_option(name: str, value: float) -> float:
     """Return ``value`` if it is a probability, else raise ``InvalidInputError``."""
     if not isinstance(value, (int, float, np.number)) or not 0 <= value <= 1:
@@ -65,7 +85,7 @@ class FiniteStateWorld(gymnasium.Env[IntArray, np.int64], ABC):
         self.missing = probability_option("missing", missing)
         self.render_mode = render_mode
         self.action_space = spaces.Discrete(n_actions)
-        self.observation_space: Any = spaces.MultiDiscrete([n_symbols + 1] * n_slots, start=[MISSING] * n_slots)
+        self.observation_space: Any = looks_space(n_slots, n_symbols)
         self.object = 0
         self.state = 0
         self._n_objects, self._n_actions = n_objects, n_actions

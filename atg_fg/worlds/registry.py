@@ -1,7 +1,7 @@
 """Worlds by name.
 
-A world has a ``Discrete`` action space and a ``MultiDiscrete`` observation space with one entry a slot:
-the symbol detected there, or ``MISSING``. One with a ``sense`` has the observations that this reads. ``info`` carries
+A world has a ``Discrete`` action space and looks with a whole number a slot: the symbol detected there, or
+``MISSING``. One with a ``sense`` has the observations that this reads. ``info`` carries
 the truth, for scoring only.
 """
 

@@ -14,6 +14,7 @@ from atg_fg.policies import StoppingPolicy, make_policy
 from atg_fg.storage.presets import preset
 from atg_fg.worlds.arcube import make_arcubes
 from atg_fg.worlds.arcube_world import ARcubeWorld
+from atg_fg.worlds.registry import make_world
 from tests.small import trial
 
 CUBES = make_arcubes(6, seed=0)
@@ -132,6 +133,16 @@ def test_what_makes_no_sense_is_refused(memory):
 
 
 # torch and pandas have warnings of their own when they are loaded.
+@pytest.mark.peers
+@pytest.mark.parametrize("name", ["ideal", "prism", "detector", "repeated-tags"])
+def test_stable_baselines3_trains_on_a_world_as_it_is(name):
+    sb3 = pytest.importorskip(
+        "stable_baselines3", reason="Stable-Baselines3 is not installed: pip install atg-fg[agents]"
+    )
+    model = sb3.PPO("MlpPolicy", make_world(name, missing=0.3), n_steps=32, batch_size=32, seed=0, device="cpu")
+    assert model.learn(64).num_timesteps == 64
+
+
 @pytest.mark.peers
 @pytest.mark.filterwarnings("ignore")
 def test_stable_baselines3_evaluates_it(memory):

@@ -13,6 +13,7 @@ from atg_fg.experiments.table1 import TestPlan, run_test
 from atg_fg.experiments.trial import check_world
 from atg_fg.worlds.arcube import make_arcubes
 from atg_fg.worlds.arcube_world import ARcubeWorld
+from atg_fg.worlds.base import symbols_of
 from atg_fg.worlds.finite_objects import FiniteObject, Mechanism, ObjectFamily
 from atg_fg.worlds.object_world import ObjectWorld, make_object_world
 from atg_fg.worlds.registry import (
@@ -140,10 +141,10 @@ class TestEveryWorld:
 
 
 def test_patterns_have_one_two_or_three_slots():
-    slots = {name: len(make_world(name, n_objects=2).observation_space.nvec) for name in OBJECT_WORLDS}
+    slots = {name: len(symbols_of(make_world(name, n_objects=2).observation_space)) for name in OBJECT_WORLDS}
     assert (slots["prism"], slots["lock"], slots["lid-box"]) == (2, 2, 3)
     one = make_world("random-atg", n_objects=2, n_slots=1, n_aspects=12)
-    assert len(one.observation_space.nvec) == 1
+    assert one.observation_space.shape == (1,)
     check_env(one.unwrapped)
 
 

@@ -1,3 +1,4 @@
+from contextlib import closing
 from itertools import pairwise
 from math import sqrt
 
@@ -5,6 +6,13 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
+from gymnasium.vector import SyncVectorEnv
+from gymnasium.wrappers import (
+    FlattenObservation,
+    FrameStackObservation,
+    RecordEpisodeStatistics,
+    TimeLimit,
+)
 
 from atg_fg.core.assumptions import arcube_assumptions
 from atg_fg.core.errors import AtgError, InvalidInputError, UnknownNameError
@@ -46,6 +54,31 @@ def test_the_ideal_world_is_found_by_its_short_and_by_its_registered_name() -> N
         assert len(world.unwrapped.cubes) == 100
         assert world.unwrapped.cubes == make_arcubes(100, seed=0)
     assert isinstance(gymnasium.make("atg_fg/ARcube-v0").unwrapped, ARcubeWorld)
+
+
+#: All that need no simulator; those of ``sim`` have the same space, which their tests say.
+IDS = sorted(name.partition(":")[2] for name in WORLDS.values() if name.startswith("atg_fg"))
+
+
+@pytest.mark.parametrize("id_", IDS)
+def test_environments_can_be_made_as_vectors_and_wrapped(id_: str) -> None:
+    def wrapped() -> gymnasium.Env:
+        made = RecordEpisodeStatistics(TimeLimit(gymnasium.make(id_, missing=0.3), 3))
+        return FrameStackObservation(FlattenObservation(made), 2)
+
+    for make in (lambda: gymnasium.make_vec(id_, num_envs=2, missing=0.3), lambda: SyncVectorEnv([wrapped, wrapped])):
+        with closing(make()) as worlds:
+            observations, _ = worlds.reset(seed=0)
+            for _ in range(7):
+                assert worlds.observation_space.contains(observations)
+                observations, *_ = worlds.step(worlds.action_space.sample())
+    assert observations.shape[:2] == (2, 2)
+
+
+def test_environments_run_beside_one_another() -> None:
+    with closing(gymnasium.make_vec(IDS[0], num_envs=2, vectorization_mode="async", missing=0.3)) as worlds:
+        worlds.reset(seed=0)
+        assert worlds.step(np.array([0, 1]))[0].shape == (2, 2)
 
 
 def test_an_unknown_world_is_refused_with_the_names_there_are() -> None:
