@@ -18,7 +18,7 @@ from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.records import TrialRecord, TrialStep
 from atg_fg.display import figures, trial_plots
 from atg_fg.display.frames import FrameFolder, has_camera
-from atg_fg.engines import begin_trial, check_engine
+from atg_fg.engines import begin_trial, engine_for
 from atg_fg.experiments.exploration import explore, learned_memory
 from atg_fg.experiments.trial import learn_from, run_trial
 from atg_fg.learning.structured_memory import memory_for
@@ -71,7 +71,7 @@ def demo(
     folder = plain_files.make_folder(output)
     console = options.console(json_file)
     learn_seed, trial_seed = np.random.SeedSequence(seed).spawn(2)
-    check_engine(engine, parameters)
+    engine_for(engine, parameters)
     world_options = {**CAMERAS.get(world, {}), **options.world_options(condition=condition, urdf=urdf)}
     # The last object is the one the robot never meets while it learns.
     cubes = make_arcubes(N_REMEMBERED + 1, seed)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from atg_fg.cli import options
-from atg_fg.engines import check_engine
+from atg_fg.engines import engine_for
 from atg_fg.experiments.document_tables import tables_of
 from atg_fg.experiments.rescore import rescore as judged_anew
 from atg_fg.experiments.scores import pooled_interval
@@ -31,7 +31,7 @@ def rescore(
     options.check_json_option(json_file)
     parameters = preset_named(preset)
     engine = options.engine_of(engine, parameters, "bayes-filter")
-    check_engine(engine, parameters)
+    engine_for(engine, parameters)
     recorded = [test for file in files for test in recorded_tests(file)]
     results = {test.place: judged_anew(test, engine, parameters) for test in recorded}
     tests = [

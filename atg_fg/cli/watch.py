@@ -15,7 +15,7 @@ from atg_fg.cli.story import Story
 from atg_fg.cli.terminal import say
 from atg_fg.core.records import TrialStep
 from atg_fg.display.rerun_viewer import TrialViewer, check_path, import_rerun
-from atg_fg.engines import begin_trial, check_engine
+from atg_fg.engines import begin_trial, engine_for
 from atg_fg.experiments.trial import run_trial
 from atg_fg.policies import make_policy
 from atg_fg.storage.presets import preset as preset_named
@@ -50,7 +50,7 @@ def watch(
         check_path(save)
     parameters = preset_named(preset)
     engine = options.engine_of(engine, parameters, "bayes-filter")
-    check_engine(engine, parameters)
+    engine_for(engine, parameters)
     chosen_policy = make_policy(policy)
     cubes = make_arcubes(N_REMEMBERED + 1, seed)
     learn_seed, trial_seed = np.random.SeedSequence(seed).spawn(2)

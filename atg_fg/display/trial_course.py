@@ -67,7 +67,7 @@ def _of_record(record: TrialRecord) -> TrialCourse:
 
 def _of_inference(inference: Inference) -> TrialCourse:
     memory, evidence, actions = inference.memory, inference.history.evidence, inference.history.actions
-    again = begin_trial(inference.name, memory, inference.parameters, inference.prior, **inference.options)
+    again = begin_trial(type(inference), memory, inference.parameters, inference.prior, **inference.options)
     beliefs, expected = [], []
     for time, look in enumerate(evidence):
         again.observe(look)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from collections.abc import Callable, Iterator, Mapping
 from importlib import import_module
 from typing import Any, Final
@@ -10,30 +11,39 @@ from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.plugins import imported, loaded, registered
 from atg_fg.engines.options import check_known
 from atg_fg.inference.interface import Inference, TrialSetup
 
+#: Entry points of other packages' engines.
+GROUP: Final = "atg_fg.engines"
+
 
 class Engines(Mapping[str, type[Inference]]):
-    """Classes by name; one is imported when it is first asked for."""
+    """Classes by name; one is imported when it is first asked for.
+
+    Other packages register engines of their own by the entry point ``atg_fg.engines``; no name here is replaced.
+    """
 
     def __init__(self, places: Mapping[str, str]) -> None:
         """Name the engines that are at ``places``, written ``module:class``; modules are those of this package."""
         self._places = dict(places)
 
     def __getitem__(self, name: str) -> type[Inference]:
+        if name not in self._places:
+            return _as_engine(loaded("engine", registered(GROUP)[name]), name)
         module, _, engine = self._places[name].partition(":")
         found: type[Inference] = getattr(import_module(f"{__name__}.{module}"), engine)
         return found
 
     def __contains__(self, name: object) -> bool:
-        return name in self._places
+        return name in self._places or name in registered(GROUP)
 
     def __iter__(self) -> Iterator[str]:
-        return iter(self._places)
+        return iter({**self._places, **registered(GROUP)})
 
     def __len__(self) -> int:
-        return len(self._places)
+        return len({**self._places, **registered(GROUP)})
 
 
 #: Classes of engines by the names that ``begin_trial`` and ``--engine`` take.
@@ -60,22 +70,43 @@ def usual_engine(parameters: ModelParameters, usual: str) -> str:
     return "learned-structure" if parameters.learn_structure else usual
 
 
-def check_engine(engine: str, parameters: ModelParameters) -> None:
-    """Check that there is an engine of this name, and that it knows the model that these parameters mean.
+def engine_for(engine: str | type[Inference], parameters: ModelParameters | None = None) -> type[Inference]:
+    """Return an engine's class.
+
+    Args:
+        engine: A name in ``ENGINES``; ``module:Class`` of a user's own, which is imported; or a class.
+        parameters: Of the model that it is to know.
 
     Raises:
         UnknownNameError: No engine has this name.
-        InvalidInputError: The engine does not know of structures that objects share.
+        InvalidInputError: The user's own cannot be imported or is no engine; or the engine does not know of structures
+            that objects share.
     """
-    if engine not in ENGINES:
+    if isinstance(engine, str) and engine not in ENGINES and ":" not in engine:
         raise unknown_name("engine", engine, ENGINES)
-    if parameters.learn_structure and not ENGINES[engine].knows_structure:
+    if not isinstance(engine, str):
+        found = _as_engine(engine, repr(engine))
+    else:
+        found = ENGINES[engine] if engine in ENGINES else _as_engine(imported("engine", engine), engine)
+    if parameters is not None and parameters.learn_structure and not found.knows_structure:
         able = ", ".join(name for name, each in ENGINES.items() if each.knows_structure)
         raise InvalidInputError(f"engine {engine!r}: does not know learn_structure; expected one of: {able}")
+    return found
+
+
+def _as_engine(found: Any, name: str) -> type[Inference]:
+    if not (isinstance(found, type) and issubclass(found, Inference)):
+        raise InvalidInputError(
+            f"engine {name!r}: {found!r}; expected a subclass of atg_fg.inference.interface.Inference"
+        )
+    if inspect.isabstract(found):
+        missing = ", ".join(sorted(found.__abstractmethods__))
+        raise InvalidInputError(f"engine {name!r}: does not define {missing}; expected all that is abstract")
+    return found
 
 
 def begin_trial(
-    engine: str,
+    engine: str | type[Inference],
     memory: RobotMemory,
     parameters: ModelParameters,
     prior: IdentityBelief | None = None,
@@ -84,7 +115,7 @@ def begin_trial(
     """Return the engine named ``engine`` at the beginning of a trial.
 
     Args:
-        engine: A name in ``ENGINES``.
+        engine: A name in ``ENGINES``, ``module:Class`` of a user's own, or a class.
         memory: The robot memory when the trial begins; it is not changed.
         parameters: α, δ and whether to learn within the trial.
         prior: p(O) when the trial begins; the memory's if not given.
@@ -95,9 +126,8 @@ def begin_trial(
         InvalidInputError: The engine does not know of structures that objects share, has no such option, or does not
             take this value; or the prior is not a distribution over the objects of this memory.
     """
-    check_engine(engine, parameters)
-    check_known(ENGINES[engine], engine, options)
-    begin: Callable[..., Inference] = ENGINES[engine]
+    begin: Callable[..., Inference] = (found := engine_for(engine, parameters))
+    check_known(found, found.name, options)
     inference = begin(TrialSetup(memory, parameters, prior), **options)
     inference.options = options
     inference._protect()

@@ -20,7 +20,7 @@ from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.goals import Goal
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.records import TrialRecord, TrialSummary
-from atg_fg.engines import begin_trial, check_engine
+from atg_fg.engines import begin_trial, engine_for
 from atg_fg.experiments.executors.base import run_pieces
 from atg_fg.experiments.exploration import complete_memory, learned_memory
 from atg_fg.experiments.goal_scores import ServedObject, score, table_of_goals
@@ -88,7 +88,7 @@ class GoalPlan:
                 raise InvalidInputError(
                     f"{name}: {getattr(self, name)}; expected at most {larger} = {getattr(self, larger)}"
                 )
-        check_engine(self.engine, self.parameters)
+        engine_for(self.engine, self.parameters)
         for role, name, known in (
             ("planner", self.planner, PLANNERS),
             ("policy", self.learning_policy, POLICIES),

@@ -15,7 +15,7 @@ from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, IntArray
-from atg_fg.engines import begin_trial, check_engine
+from atg_fg.engines import begin_trial, engine_for
 from atg_fg.inference.interface import Inference
 from atg_fg.policies import Policy, make_policy
 from atg_fg.worlds.base import detection_of
@@ -51,7 +51,7 @@ class RecognitionAgent:
         policy: str | Policy = "entropy",
         seed: int = 0,
     ) -> None:
-        check_engine(engine, parameters)
+        engine_for(engine, parameters)
         self.memory, self.parameters, self.engine = memory, parameters, engine
         self.policy: Policy = make_policy(policy) if isinstance(policy, str) else policy
         self._seeds = np.random.SeedSequence(seed)

@@ -17,7 +17,7 @@ from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.records import TrialRecord, TrialStep, TrialSummary
-from atg_fg.engines import begin_trial, check_engine
+from atg_fg.engines import begin_trial, engine_for
 from atg_fg.experiments.scores import Score
 from atg_fg.experiments.trial import check_world, learn_from, sensed_look
 from atg_fg.inference.interface import Inference
@@ -85,7 +85,7 @@ class RecognitionEnv(gymnasium.Env[Summary, np.int64]):
         n_trials: int = 100,
         made_from: Mapping[str, object] | None = None,
     ) -> None:
-        check_engine(engine, parameters)
+        engine_for(engine, parameters)
         if reward not in _REWARDS:
             raise unknown_name("reward", reward, _REWARDS)
         for name, number in (("n_actions", n_actions), ("n_trials", n_trials)):

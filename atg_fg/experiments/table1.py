@@ -16,7 +16,7 @@ from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.records import Mended, TrialRecord, TrialSummary
-from atg_fg.engines import begin_trial, check_engine
+from atg_fg.engines import begin_trial, engine_for
 from atg_fg.experiments.executors.base import is_cluster, run_pieces
 from atg_fg.experiments.executors.steps import step_done
 from atg_fg.experiments.plans import unusual
@@ -72,7 +72,7 @@ class TestPlan:
     def __post_init__(self) -> None:
         for name in ("n_actions", "n_trials", "n_objects"):
             whole_number(getattr(self, name), name, least=1)
-        check_engine(self.engine, self.parameters)
+        engine_for(self.engine, self.parameters)
         if self.settled is not None:
             check_entropy_threshold(self.settled, "settled")
         make_policy(self.policy, self.settled)

@@ -7,7 +7,8 @@ from functools import partial
 from typing import Final
 
 from atg_fg.core.errors import unknown_name
-from atg_fg.policies.agent import AgentPolicy, SampledPolicy, as_policy, imported_policy
+from atg_fg.core.plugins import imported, loaded, registered
+from atg_fg.policies.agent import AgentPolicy, SampledPolicy, as_policy
 from atg_fg.policies.base import Choice, Policy
 from atg_fg.policies.exploration import ExplorationPolicy
 from atg_fg.policies.goal import GoalPolicy
@@ -47,8 +48,8 @@ def make_policy(name: str, entropy_threshold: float | None = None) -> Policy:
     """Return the policy named ``name``.
 
     Args:
-        name: In ``POLICIES``, or ``module:object`` of a user's own: a policy, an agent with ``predict``, or a space of
-            actions.
+        name: In ``POLICIES``; registered by another package by the entry point ``atg_fg.policies``; or
+            ``module:object`` of a user's own: a policy, an agent with ``predict``, or a space of actions.
         entropy_threshold: Entropy of the verdict, nats, at which the policy ends the trial; it never does if not given.
 
     Raises:
@@ -56,7 +57,15 @@ def make_policy(name: str, entropy_threshold: float | None = None) -> Policy:
         InvalidInputError: The user's own cannot be imported, or is no policy; or the threshold is not a finite entropy
             above 0.
     """
-    if name not in POLICIES and ":" not in name:
-        raise unknown_name("policy", name, POLICIES)
-    policy = POLICIES[name]() if name in POLICIES else imported_policy(name)
+    policy = _policy(name)
     return policy if entropy_threshold is None else StoppingPolicy(policy, entropy_threshold)
+
+
+def _policy(name: str) -> Policy:
+    if name in POLICIES:
+        return POLICIES[name]()
+    others = registered("atg_fg.policies")
+    if name not in others and ":" not in name:
+        raise unknown_name("policy", name, [*POLICIES, *others])
+    found = loaded("policy", others[name]) if name in others else imported("policy", name)
+    return as_policy(found, f"policy {name!r}")

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib
 from typing import Any, ClassVar, Protocol
 
 import gymnasium
@@ -105,30 +104,6 @@ def as_policy(given: Any, place: str = "policy") -> Policy:
         f"{place}: {made!r}; expected an object with choose(inference, rng), one with "
         "predict(observation, deterministic), or a gymnasium space"
     )
-
-
-def imported_policy(name: str) -> Policy:
-    """Return the policy named ``module:object``.
-
-    Raises:
-        InvalidInputError: There is no such module or object, or it can be no policy.
-    """
-    module, _, attribute = name.partition(":")
-    if not all(word.isidentifier() for word in module.split(".")):
-        raise InvalidInputError(
-            f"policy {name!r}: cannot be imported: no name of a module; expected module:object, on Python's path"
-        )
-    try:
-        found = importlib.import_module(module)
-    except (ImportError, ValueError) as error:
-        raise InvalidInputError(
-            f"policy {name!r}: cannot be imported: {error}; expected module:object, on Python's path"
-        ) from error
-    for part in attribute.split("."):
-        if not hasattr(found, part):
-            raise InvalidInputError(f"policy {name!r}: {module} has no {attribute!r}; expected module:object")
-        found = getattr(found, part)
-    return as_policy(found, f"policy {name!r}")
 
 
 def _action(value: Any, n_actions: int) -> int:
