@@ -16,6 +16,7 @@ from atg_fg.cli.lazy_commands import LazyCommand, LazyGroup
 from atg_fg.core.errors import AtgError, InvalidInputError
 from atg_fg.core.version import __version__
 from atg_fg.core.visible_text import visible
+from atg_fg.kernels.compilation import tell_of_compilation
 
 #: The commands, and groups of them, by the panel of the help page that they stand in; each with its place.
 COMMANDS: Final = {
@@ -112,6 +113,7 @@ def main() -> None:
     for stream in (sys.stdout, sys.stderr):
         if isinstance(stream, TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # for terminals, and file names, of other encodings
+    tell_of_compilation(_say_that_loops_are_compiled)
     try:
         status = app(standalone_mode=False)
         sys.stdout.flush()
@@ -122,6 +124,10 @@ def main() -> None:
     except (OSError, SystemExit) as error:
         sys.exit(_left_by_output(error))
     sys.exit(status if isinstance(status, int) else 0)
+
+
+def _say_that_loops_are_compiled() -> None:
+    print("atg-fg: compiling loops, which takes some seconds the first time", file=sys.stderr, flush=True)
 
 
 def _left_by_output(error: OSError | SystemExit) -> int:

@@ -1,15 +1,25 @@
-"""The paper's own method: a Bayes filter, in NumPy.
+"""The paper's own method: a Bayes filter.
 
 A transition row is ``prior_weight · base_row`` plus a few counted edges (``atg_fg.inference.recognition_model``), so a
-step costs what the known edges cost.
+step costs what the known edges cost. Where Numba is installed the loops over them are compiled (``atg_fg.kernels``),
+and the model's tables are only made if something asks for them; else NumPy computes the same.
 """
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
-from atg_fg.core.patterns import FloatArray
-from atg_fg.engines.filtering import FilterInference
+import numpy as np
+
+from atg_fg.core.belief import IdentityBelief
+from atg_fg.core.patterns import Evidence, FloatArray
+from atg_fg.engines.filtering import FilterInference, FilterState
+from atg_fg.engines.tables_on_demand import TablesOnDemand
+from atg_fg.inference.recognition_model import RecognitionModel
+from atg_fg.kernels import compilation
+
+if TYPE_CHECKING:
+    from atg_fg.kernels.compiled_filter import CompiledFilter
 
 
 class BayesFilter(FilterInference):
@@ -17,6 +27,55 @@ class BayesFilter(FilterInference):
 
     name: ClassVar[str] = "bayes-filter"
     exact: ClassVar[bool] = True
+
+    _compiled: CompiledFilter | None = None
+
+    def _tables(self) -> RecognitionModel:
+        if not compilation.are_wanted():
+            return super()._tables()
+        return TablesOnDemand(self.memory, self.parameters, self.prior, graphs=list(self.memory))
+
+    def _begin(self) -> None:
+        if not isinstance(self.model, TablesOnDemand):
+            super()._begin()
+            return
+        from atg_fg.kernels.compiled_filter import CompiledFilter  # it loads Numba
+
+        self._compiled = CompiledFilter(self.memory, self.parameters, self.model.prior)
+
+    @property
+    def _belief(self) -> FilterState:
+        return super()._belief if self._compiled is None else FilterState(*self._compiled.state())
+
+    def identity(self) -> IdentityBelief:
+        """Return p(O | z_0:t, a_1:t) (eq. 1 and 2)."""
+        if self._compiled is None:
+            return super().identity()
+        return IdentityBelief.of(self._compiled.identity, self.model.n_unseen)
+
+    def _look(self, evidence: Evidence) -> None:
+        if self._compiled is None:
+            super()._look(evidence)
+            return
+        log_probability = self._compiled.look(evidence.likelihood)
+        if not np.isfinite(log_probability):
+            raise self._impossible()
+        self._log_evidence += log_probability
+        self._learn()
+        previous, action, pattern = self.history.step(len(self.history.evidence) - 1)
+        if self.parameters.learn_in_trial and pattern is not None:
+            self._compiled.learn(previous, action, pattern)
+
+    def _act(self, action: int) -> None:
+        if self._compiled is None:
+            super()._act(action)
+        else:
+            self._compiled.act(action)
+
+    def _expected_entropies(self) -> FloatArray:
+        if self._compiled is None:
+            return super()._expected_entropies()
+        return self._compiled.expected_entropies(self.model.n_unseen)
 
     def _propagate(self, aspects: FloatArray, action: int) -> FloatArray:
         return self.model.predict(aspects, action)

@@ -14,7 +14,7 @@ from atg_fg.inference.interface import Inference, TrialSetup
 from atg_fg.inference.recognition_model import widened
 
 
-class _State(NamedTuple):
+class FilterState(NamedTuple):
     """A filter's state: ln p(O | z), shape [H], and p(X_t | O, z), shape [H, W]."""
 
     log_identity: FloatArray
@@ -32,7 +32,15 @@ class FilterInference(Inference):
 
     def __init__(self, setup: TrialSetup) -> None:
         super().__init__(setup)
-        self._belief = _State(log_of(self.model.prior), self.model.base_row)
+        self._begin()
+
+    def _begin(self) -> None:
+        self._state = FilterState(log_of(self.model.prior), self.model.base_row)
+
+    @property
+    def _belief(self) -> FilterState:
+        """The belief; an engine that keeps it in a form of its own overrides this."""
+        return self._state
 
     def identity(self) -> IdentityBelief:
         """Return p(O | z_0:t, a_1:t) (eq. 1 and 2)."""
@@ -48,15 +56,15 @@ class FilterInference(Inference):
         self._condition(self.model.likelihood(evidence))
         revelation = self._learn()
         if revelation is not None:
-            aspects = widened(self._belief.aspects, self.model.n_states)
+            aspects = widened(self._state.aspects, self.model.n_states)
             revelation.move(aspects)
-            self._belief = _State(self._belief.log_identity, aspects)
+            self._state = FilterState(self._state.log_identity, aspects)
 
     def _condition(self, likelihood: FloatArray) -> None:
-        joint = self._correct(self._belief.aspects, likelihood)
+        joint = self._correct(self._state.aspects, likelihood)
         given_object = joint.sum(axis=1)
         possible = given_object > 0
-        log_joint = self._belief.log_identity + log_of(given_object)
+        log_joint = self._state.log_identity + log_of(given_object)
         peak = log_joint.max()
         if not np.isfinite(peak):
             raise self._impossible()
@@ -64,12 +72,12 @@ class FilterInference(Inference):
         aspects = joint / np.where(possible, given_object, 1.0)[:, None]
         if not possible.all():
             # A hypothesis that is ruled out keeps its prediction; its weight is zero from here on.
-            aspects[~possible] = self._belief.aspects[~possible]
-        self._belief = _State(log_joint - log_probability, aspects)
+            aspects[~possible] = self._state.aspects[~possible]
+        self._state = FilterState(log_joint - log_probability, aspects)
         self._log_evidence += log_probability
 
     def _act(self, action: int) -> None:
-        self._belief = _State(self._belief.log_identity, self._propagate(self._belief.aspects, action))
+        self._state = FilterState(self._state.log_identity, self._propagate(self._state.aspects, action))
 
     @abstractmethod
     def _propagate(self, aspects: FloatArray, action: int) -> FloatArray:

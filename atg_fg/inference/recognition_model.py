@@ -21,6 +21,7 @@ With n of G aspects known, c transitions counted from x by a, and the symbols of
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from copy import copy
 from itertools import chain
 from typing import Any, NamedTuple, TypeVar
@@ -28,6 +29,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.compact.columns import positions
 from atg_fg.core.memory import RobotMemory
@@ -88,7 +90,9 @@ class RecognitionModel:
 
     def __init__(self, memory: RobotMemory, parameters: ModelParameters, prior: IdentityBelief | None = None) -> None:
         self._set_sizes(memory, parameters, prior)
-        graphs = list(memory)
+        self._make_tables(list(memory))
+
+    def _make_tables(self, graphs: Sequence[AspectTransitionGraph]) -> None:
         self.n_known = np.array([graph.n_known for graph in graphs] + [0], dtype=np.int64)
         self.aspect_of = np.full((self.n_hypotheses, self.n_patterns), COLLECTION, dtype=np.int64)
         self.pattern_of = np.full((self.n_hypotheses, 1 + int(self.n_known.max())), -1, dtype=np.int64)

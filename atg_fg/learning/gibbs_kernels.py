@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from atg_fg.core.patterns import FloatArray, IntArray
+from atg_fg.kernels.compilation import compiled
 from atg_fg.learning.kernels import (
     Clusters,
     TrialArrays,
-    compiled,
     draw_by_logarithm,
     forget,
     learn_again,

@@ -9,29 +9,15 @@ This module is loaded where something is sampled, and not before: it takes longe
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple, TypeVar
+from typing import NamedTuple
 
 import numpy as np
 
-from atg_fg.core.errors import MissingDependencyError
 from atg_fg.core.patterns import FloatArray, IntArray
-
-try:
-    import numba
-except ImportError as error:
-    raise MissingDependencyError("learning: Numba is not installed; expected it from: pip install numba") from error
-
-_Function = TypeVar("_Function", bound=Callable[..., Any])
+from atg_fg.kernels.compilation import compiled
 
 #: Products are put aside as a logarithm before they leave the range of floating-point numbers.
 _SMALL = 1e-120
-
-
-def compiled(function: _Function) -> _Function:
-    """Have Numba compile a function, and keep what it made beside the source."""
-    result: _Function = numba.njit(cache=True)(function)
-    return result
 
 
 class TrialArrays(NamedTuple):

@@ -15,7 +15,7 @@ from atg_fg.core.patterns import Evidence, FloatArray, IntArray
 from atg_fg.engines.large_memory.aspect_filter import AspectFilter
 from atg_fg.engines.large_memory.decision import by_class, entropy_bound, expected_entropies, is_decided, one_by_one
 from atg_fg.engines.large_memory.never_matched import ClassMasses, NeverMatched
-from atg_fg.engines.large_memory.tables_on_demand import TablesOnDemand
+from atg_fg.engines.tables_on_demand import MAX_CELLS, TablesOnDemand
 from atg_fg.inference.chain import build_chain, forward_backward
 from atg_fg.inference.interface import Inference, TrialSetup
 
@@ -85,7 +85,7 @@ class LargeMemory(Inference):
         self._class_of = self._classes.rows_of(self._compact.n_known).astype(np.int32)
 
     def _tables(self) -> TablesOnDemand:
-        return TablesOnDemand(self.memory, self.parameters, self.prior)
+        return TablesOnDemand(self.memory, self.parameters, self.prior, max_cells=MAX_CELLS)
 
     def _filter_of(self, objects: IntArray, *, unseen: bool = False) -> AspectFilter:
         """Return a filter of some objects, and of *unseen* before them, at the beginning of the trial."""

@@ -15,7 +15,7 @@ from atg_fg.core.errors import ImpossibleEvidenceError, InvalidInputError, TooLa
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.engines import begin_trial
-from atg_fg.engines.large_memory import tables_on_demand
+from atg_fg.engines.large_memory import engine as large_memory_engine
 from atg_fg.engines.large_memory.aspect_filter import AspectFilter
 from atg_fg.engines.large_memory.engine import LargeMemory
 from atg_fg.experiments.engine_comparison import total_variation
@@ -213,7 +213,7 @@ def test_smoothed_aspects_are_exact_of_objects_that_never_matched_too() -> None:
 
 
 def test_tables_that_would_be_too_large_are_refused_and_the_rest_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tables_on_demand, "MAX_CELLS", 100)
+    monkeypatch.setattr(large_memory_engine, "MAX_CELLS", 100)
     case = many_objects(2)
     inference = begun(case, n_exact=0)
     inference.observe(case.looks[0].evidence(case.assumptions.alphabet))

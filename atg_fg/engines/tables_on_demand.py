@@ -1,16 +1,18 @@
-"""The model's tables, made when they are first asked for: those of a large memory are too large to make at once."""
+"""The model's tables, made when they are first asked for: many an engine does without them as a rule."""
 
 from __future__ import annotations
 
-from typing import Any, Final
+from collections.abc import Sequence
+from typing import Any, Final, Self
 
+from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.errors import TooLargeError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.inference.recognition_model import RecognitionModel, Revelation
 
-#: Objects times patterns, above which tables over both are refused.
+#: Objects times patterns, above which an engine for large memories refuses tables over both.
 MAX_CELLS: Final = 5_000_000
 
 
@@ -23,15 +25,25 @@ class TablesOnDemand(RecognitionModel):
         memory: The robot memory when the trial begins.
         parameters: α, δ and whether to learn within the trial.
         prior: p(O) in place of the memory's.
+        graphs: The ATGs of the memory as they are when the trial begins; if not given, it is asked for them later on.
+        max_cells: Objects times patterns, above which tables over both are refused.
 
     Raises:
         InvalidInputError: ``prior`` is not a distribution over the objects of this memory.
-        TooLargeError: On asking for a table, if there would be more than ``MAX_CELLS`` objects times patterns.
+        TooLargeError: On asking for a table, if there would be more than ``max_cells`` objects times patterns.
     """
 
-    def __init__(self, memory: RobotMemory, parameters: ModelParameters, prior: IdentityBelief | None = None) -> None:
+    def __init__(
+        self,
+        memory: RobotMemory,
+        parameters: ModelParameters,
+        prior: IdentityBelief | None = None,
+        *,
+        graphs: Sequence[AspectTransitionGraph] | None = None,
+        max_cells: int | None = None,
+    ) -> None:
         self._set_sizes(memory, parameters, prior)
-        self._given = prior
+        self._graphs, self._max_cells = graphs, max_cells
         self._put_off: list[tuple[int | None, int | None, int | None]] | None = []
 
     def __getattr__(self, name: str) -> Any:
@@ -39,16 +51,28 @@ class TablesOnDemand(RecognitionModel):
         put_off = self.__dict__.get("_put_off")
         if put_off is None or name.startswith("__"):
             raise AttributeError(name)
-        if self.n_hypotheses * self.n_patterns > MAX_CELLS:
+        self._make()
+        return getattr(self, name)
+
+    def _make(self) -> None:
+        if self._put_off is None:
+            return
+        if self._max_cells is not None and self.n_hypotheses * self.n_patterns > self._max_cells:
             raise TooLargeError(
                 f"tables over {self.n_hypotheses - 1} objects and {self.n_patterns} patterns; expected at most "
-                f"{MAX_CELLS} entries: ask for identity, expected entropies or smoothed aspects, or another engine"
+                f"{self._max_cells}: ask for identity, expected entropies or smoothed aspects, or another engine"
             )
-        self._put_off = None
-        super().__init__(self.memory, self.parameters, self._given)
+        put_off, self._put_off = self._put_off, None
+        self._make_tables(list(self.memory) if self._graphs is None else self._graphs)
         for looked in put_off:
             super().learn(*looked)
-        return getattr(self, name)
+
+    def __copy__(self) -> Self:
+        """Return a model that what this one learns later does not reach."""
+        self._make()
+        twin = object.__new__(type(self))
+        twin.__setstate__(vars(self))
+        return twin
 
     def learn(self, previous: int | None, action: int | None, pattern: int | None) -> Revelation | None:
         """Extend every hypothesis by what was just seen, at once or when the tables are made.

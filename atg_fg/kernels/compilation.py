@@ -1,0 +1,73 @@
+"""Whether loops are compiled, how, and who is told that it takes a moment."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from functools import cache
+from importlib.util import find_spec
+from typing import Any, Final, TypeVar
+
+from atg_fg.core.errors import MissingDependencyError
+
+_Function = TypeVar("_Function", bound=Callable[..., Any])
+
+#: Environment variable that turns compiled filters off when it is ``0``: NumPy then computes what they would.
+SWITCH: Final = "ATG_FG_KERNELS"
+
+_tell: Callable[[], None] | None = None
+
+
+@cache
+def _is_installed() -> bool:
+    return find_spec("numba") is not None
+
+
+def are_wanted() -> bool:
+    """Return whether filters are to be compiled: Numba is installed, and ``SWITCH`` does not say otherwise."""
+    return os.environ.get(SWITCH) != "0" and _is_installed()
+
+
+def tell_of_compilation(tell: Callable[[], None]) -> None:
+    """Have a function called before the first loop of this process is compiled, rather than read from the cache."""
+    global _tell
+    _tell = tell
+
+
+def compiled(function: _Function) -> _Function:
+    """Have Numba compile a function, and keep what it made beside the source: the next process compiles nothing.
+
+    Raises:
+        MissingDependencyError: Numba is not installed.
+    """
+    result: _Function = _numba().njit(cache=True)(function)
+    return result
+
+
+def reordered(function: _Function) -> _Function:
+    """Have Numba compile a function as ``compiled`` does, and let it change the order in which numbers are added up."""
+    result: _Function = _numba().njit(cache=True, fastmath={"reassoc", "contract"})(function)
+    return result
+
+
+@cache
+def _numba() -> Any:
+    """Return Numba, which from now on says when it compiles."""
+    try:
+        import numba
+    except ImportError as error:
+        raise MissingDependencyError("Numba is not installed; expected it from: pip install numba") from error
+    from numba.core import event
+
+    class Listener(event.Listener):
+        def on_start(self, event: Any) -> None:
+            global _tell
+            tell, _tell = _tell, None
+            if tell is not None:
+                tell()
+
+        def on_end(self, event: Any) -> None:
+            pass
+
+    event.register("numba:compile", Listener())  # type: ignore[no-untyped-call]
+    return numba
