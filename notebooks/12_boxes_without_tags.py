@@ -119,8 +119,9 @@ for number in range(40):
     rng = np.random.default_rng(number)
     record = run_trial(world, inference, atg.make_policy("entropy"), 10, rng, on_step=keep)
     learn_from(record, memory)
-    verdicts.append((record.steps[0].truth["object"], record.verdict, record.matched))
+    verdicts.append((record.steps[0].truth["object"], record.verdict))
 
+# %%
 looks = [look for trial in memory.sense.trials for look in trial.detections]
 members = {}
 for number, look in enumerate(looks):
@@ -155,7 +156,7 @@ print("classes", look.evidence.detection, "with probability", look.evidence.conf
 # "The face with this picture in front": a goal given by a crop. The robot remembers the box from another trial.
 
 # %%
-presented = next(of for of, verdict, _ in verdicts if verdict == "known")
+presented = next(number for number, verdict in verdicts if verdict == "known")
 world.reset(seed=5, options={"object": presented, "orientation": 9})
 wanted = camera.crops[0]
 symbol = memory.sense.symbol_of(camera.features(wanted))
