@@ -12,6 +12,8 @@ import pytest
 ROOT = Path(__file__).parents[1]
 #: The first two chunks of random models, every engine, the oracle beside them.
 TESTS = ["tests/engines/test_agreement.py", "-k", "posterior and (-0] or -1])"]
+#: The compiled filter beside the one in NumPy.
+TESTS_OF_KERNELS = ["tests/kernels/test_compiled_filter.py"]
 
 
 @dataclass(frozen=True)
@@ -34,8 +36,8 @@ FAULTS = [
     Fault(
         "posterior not normalised",
         "engines/filtering.py",
-        "self._belief = _State(log_joint - log_probability, aspects)",
-        "self._belief = _State(log_joint, aspects)",
+        "self._state = FilterState(log_joint - log_probability, aspects)",
+        "self._state = FilterState(log_joint, aspects)",
     ),
     Fault(
         "keys of the transition factor in the wrong order",
@@ -109,14 +111,33 @@ FAULTS = [
         " - joint_terms + unseen * np.log(model.n_unseen)",
         " - joint_terms",
     ),
+    Fault(
+        "compiled: an aspect found takes all of the collection node",
+        "kernels/belief_kernels.py",
+        "revealed = aspects[hypothesis, 0] * (1.0 if target == constants.n_aspects else share)",
+        "revealed = aspects[hypothesis, 0]",
+    ),
+    Fault(
+        "compiled: a state shows its pattern without noise",
+        "kernels/belief_kernels.py",
+        "aspects[hypothesis, state] * (observed * evidence[pattern] + noise)",
+        "aspects[hypothesis, state] * (observed * evidence[pattern])",
+    ),
+    Fault(
+        "compiled: a new edge out of its order",
+        "kernels/belief_kernels.py",
+        "while place > first and not _precedes(tables, place - 1, action, target, source):",
+        "while False:",
+    ),
 ]
 QUICK = FAULTS[:2]
 
 
-def passes_its_tests(folder: Path) -> bool:
-    """Run the copy's own tests in the folder of the copy."""
-    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-n", "0", *TESTS]
-    environment = {**os.environ, "PYTHONPATH": str(folder)}
+def passes_its_tests(folder: Path, of_kernels: bool = False) -> bool:
+    """Run the copy's own tests in the folder of the copy: of the engines, all in NumPy, or of compiled loops."""
+    tests = TESTS_OF_KERNELS if of_kernels else TESTS
+    command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-n", "0", *tests]
+    environment = {**os.environ, "PYTHONPATH": str(folder), "ATG_FG_KERNELS": "0"}
     done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode in (0, 1), done.stdout + done.stderr
     return done.returncode == 0
@@ -135,7 +156,7 @@ def check_is_caught(fault: Fault, copy: Path) -> None:
     text = file.read_text()
     assert text.count(fault.right) == 1, f"{fault.file} has changed; expected once: {fault.right}"
     file.write_text(text.replace(fault.right, fault.wrong))
-    assert not passes_its_tests(copy), f"not caught: {fault.name}"
+    assert not passes_its_tests(copy, of_kernels=fault.file.startswith("kernels/")), f"not caught: {fault.name}"
 
 
 def test_the_copy_without_a_fault_passes(copy):
