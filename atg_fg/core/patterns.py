@@ -225,7 +225,9 @@ class Evidence:
         if pattern is not None:
             likelihood = np.zeros(len(alphabet))
             likelihood[pattern] = 1.0
-            return cls(likelihood, pattern, checked, stated)
+            evidence = cls(likelihood, pattern, checked, stated)
+            vars(evidence)["_range"] = (0.0, 1.0, 1.0)  # spares looking for it: most looks are such
+            return evidence
         agrees = np.ones(len(alphabet), dtype=bool)
         for slot, symbol in enumerate(checked):
             if symbol is not None:
@@ -286,11 +288,17 @@ class Evidence:
             raise InvalidInputError("evidence: all zero; expected at least one pattern that it is possible under")
         return evidence
 
+    @cached_property
+    def _range(self) -> tuple[float, float, float]:
+        """The least weight, the least above zero (∞ if there is none), and the greatest; NaN if one of them is."""
+        weights = self.likelihood
+        return float(weights.min()), float(weights.min(where=weights > 0, initial=np.inf)), float(weights.max())
+
     def check(self, n_patterns: int) -> None:
         """Raise ``InvalidInputError`` if this is no likelihood over ``n_patterns`` patterns."""
         if self.likelihood.shape != (n_patterns,):
             raise InvalidInputError(f"evidence: shape {self.likelihood.shape}; expected ({n_patterns},)")
-        least, greatest = self.likelihood.min(), self.likelihood.max()
+        least, _, greatest = self._range
         if not (least >= 0 and greatest < np.inf):  # a NaN is neither
             raise InvalidInputError(f"evidence: weights from {least} to {greatest}; expected finite ones of at least 0")
         if self.pattern is not None:
@@ -302,8 +310,8 @@ class Evidence:
         Weights below ``LEAST_SHARE`` of the greatest count as zero: no engine could tell what becomes of them. If the
         greatest is below ``LEAST_SHARE`` or above its inverse, all are divided by it.
         """
-        weights, greatest = self.likelihood, float(self.likelihood.max())
-        if ((weights > 0) & (weights < LEAST_SHARE * greatest)).any():
+        weights, (_, least_above_zero, greatest) = self.likelihood, self._range
+        if least_above_zero < LEAST_SHARE * greatest:
             weights = np.where(weights < LEAST_SHARE * greatest, 0.0, weights)
         if greatest and not LEAST_SHARE <= greatest <= 1 / LEAST_SHARE:
             return replace(self, likelihood=weights / greatest), math.log(greatest)

@@ -7,9 +7,8 @@ and the model's tables are only made if something asks for them; else NumPy comp
 
 from __future__ import annotations
 
+import math
 from typing import TYPE_CHECKING, ClassVar
-
-import numpy as np
 
 from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.patterns import Evidence, FloatArray
@@ -58,7 +57,7 @@ class BayesFilter(FilterInference):
             super()._look(evidence)
             return
         log_probability = self._compiled.look(evidence.likelihood)
-        if not np.isfinite(log_probability):
+        if not math.isfinite(log_probability):
             raise self._impossible()
         self._log_evidence += log_probability
         self._learn()

@@ -76,7 +76,7 @@ class Inference(ABC):
         return RecognitionModel(self.memory, self.parameters, self.prior)
 
     def _protect(self) -> None:
-        protect(value for name, value in vars(self).items() if not name.startswith("_"))
+        protect([each for name, each in vars(self).items() if isinstance(each, (np.ndarray, tuple)) and name[0] != "_"])
 
     def __copy__(self) -> Self:
         return deepcopy(self)

@@ -63,7 +63,7 @@ class CompiledFilter:
             log_updated,
             identity,
         )
-        if np.isfinite(log_probability):
+        if math.isfinite(log_probability):
             self._aspects, self._next_aspects = self._next_aspects, self._aspects
             self._log_identity, self.identity = log_updated, identity
         return float(log_probability)
