@@ -8,7 +8,8 @@ by any action, are the states of one variable: the *cells*. X_t is eliminated fr
 in which states of X_t with the same weights are one state, numbered anew for each object and action. Which these are
 follows from the form of a transition row, ``prior_weight · base_row`` plus a few counted edges (see
 ``atg_fg.inference.recognition_model``). As far as the base goes, they are the aspects from which the action was counted
-as often (``RowKinds``). In a cell that edges lead to, they are all aspects without such an edge (``EdgesInto``).
+as often (``RowKinds``). As far as edges go, they are the sources of the edges into a cell (``EdgesInto``). What is left
+of X_t by both is added up.
 """
 
 from __future__ import annotations
@@ -74,26 +75,40 @@ class RowKinds:
 
 
 class EdgesInto:
-    """The states of X_t by the edges into a cell: 0 for no edge, then the source of each edge.
+    """p(cell) = Σ_x belief(x) · weight(x, cell) over the edges into each cell, where x is the source of an edge.
+
+    Where one edge leads to a cell there is one such x, and nothing to sum out.
 
     Args:
         cells: The cell that each edge leads to, shape [E].
         n_cells: C.
+        weights: Of each edge, shape [E].
     """
 
-    def __init__(self, cells: IntArray, n_cells: int) -> None:
-        order = np.argsort(cells, kind="stable")
-        in_order = cells[order]
-        states = np.empty_like(cells)
-        states[order] = 1 + np.arange(len(cells)) - np.searchsorted(in_order, in_order)
-        self._places = states * n_cells + cells
-        self._n_cells = n_cells
-        # A factor has at least one cell, even where no edge leads anywhere.
-        self._shape = (1 + int(states.max(initial=0)), max(n_cells, 1))
+    def __init__(self, cells: IntArray, n_cells: int, weights: FloatArray) -> None:
+        shared = np.bincount(cells, minlength=n_cells) > 1
+        several = shared[cells]
+        self._alone, self._together = np.flatnonzero(~several), np.flatnonzero(several)
+        self._cells, self._n_cells, self._weights = cells, n_cells, weights
+        self._shared = np.flatnonzero(shared)
+        number = (np.cumsum(shared) - 1)[cells[self._together]]
+        order = np.argsort(number, kind="stable")
+        states = np.empty_like(number)
+        states[order] = np.arange(len(number)) - np.searchsorted(number[order], number[order])
+        self._places = states * len(self._shared) + number
+        self._shape = (1 + int(states.max(initial=0)), len(self._shared))
+        self._factor = CellFactor(self.table(weights)) if len(self._shared) else None
 
-    def table(self, no_edge: FloatArray | float, edges: FloatArray) -> FloatArray:
-        """Return a table, shape [S, max(C, 1)], with the values of state 0, [C], and of each edge, [E]."""
+    def table(self, values: FloatArray) -> FloatArray:
+        """Return values of edges, shape [E], by state and cell, shape [S, C'], of cells that several lead to."""
         table = np.zeros(self._shape)
-        table[0, : self._n_cells] = no_edge
-        table.ravel()[self._places] = edges
+        table.ravel()[self._places] = values[self._together]
         return table
+
+    def arrivals(self, belief: FloatArray) -> FloatArray:
+        """Return p(cell), shape [C], from the belief in the source of each edge, shape [E]."""
+        arrived = np.zeros(self._n_cells)
+        arrived[self._cells[self._alone]] = (belief * self._weights)[self._alone]
+        if self._factor is not None:
+            arrived[self._shared] = self._factor.without_aspect(belief_factor(self.table(belief)))
+        return arrived

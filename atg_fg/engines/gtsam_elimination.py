@@ -15,7 +15,7 @@ import numpy as np
 from atg_fg.core.errors import ImpossibleEvidenceError
 from atg_fg.core.patterns import FloatArray
 from atg_fg.engines.filtering import FilterInference
-from atg_fg.engines.gtsam_cells import CellFactor, EdgesInto, RowKinds, belief_factor
+from atg_fg.engines.gtsam_cells import CellFactor, EdgesInto, RowKinds
 from atg_fg.inference import gtsam_factors as factors
 from atg_fg.inference.expected_entropy import NextPatternJoint, expected_entropies
 from atg_fg.inference.factor_graph import RecognitionGraph
@@ -89,18 +89,16 @@ class TransitionFactors:
         edges = model.edges.chosen(chosen)
         self._rows = RowKinds(model.prior_weight[[action]])
         self._base = CellFactor(self._rows.prior_weight)
-        self._states = model.states
-        cells = np.searchsorted(self._states, edges.hypothesis * model.n_states + edges.target)
-        self._edges = EdgesInto(cells, len(self._states))
+        self._base_row = model.base_row
+        cells = edges.hypothesis * model.n_states + edges.target
+        self._edges = EdgesInto(cells, model.base_row.size, model.edge_probability[chosen])
         self._sources = model.edge_source[chosen]
-        self._next = CellFactor(self._edges.table(model.base_row.ravel()[self._states], model.edge_probability[chosen]))
 
     def next_aspects(self, mass: FloatArray) -> FloatArray:
         """Return Σ_x mass(i, x) p(x' | x, a, i), shape [H, W], from ``mass`` [H, W]."""
         kept = self._base.without_aspect(self._rows.belief(mass))
-        belief = self._edges.table(kept[self._states // mass.shape[1]], mass.ravel()[self._sources])
-        predicted = np.zeros(mass.shape)
-        predicted.ravel()[self._states] = self._next.without_aspect(belief_factor(belief))
+        arrived = self._edges.arrivals(mass.ravel()[self._sources]).reshape(mass.shape)
+        predicted: FloatArray = kept[:, None] * self._base_row + arrived
         return predicted
 
 
@@ -113,21 +111,13 @@ class HypotheticalFactors:
 
     def __init__(self, model: RecognitionModel) -> None:
         self._model = model
-        observed = 1.0 - model.parameters.observation_noise
-        noise = model.parameters.observation_noise / model.n_patterns
         self._rows = RowKinds(model.prior_weight)
-        unknown = np.tile(model.base_collection_rate, model.n_actions)
-        self._unknown = CellFactor(self._rows.prior_weight * unknown + noise)
-        self._unreached = CellFactor(self._rows.prior_weight * (observed / model.n_aspects) + noise)
-        self._edges = EdgesInto(model.edge_target, len(model.targets.row))
-        self._reached = CellFactor(self._edges.table(1.0, observed * model.edge_probability))
+        self._base = CellFactor(self._rows.prior_weight)
+        self._edges = EdgesInto(model.edge_target, len(model.targets.row), model.edge_probability)
 
     def next_patterns(self, mass: FloatArray) -> NextPatternJoint:
         """Return p(O, z | a) for each kind of pattern from p(O, X_t), shape [H, W]."""
         model = self._model
-        belief = self._rows.belief(mass)
-        unknown, unreached = self._unknown.without_aspect(belief), self._unreached.without_aspect(belief)
-        carried = self._edges.table(unreached[model.targets.row], mass.ravel()[model.edge_source])
-        reached = self._reached.without_aspect(belief_factor(carried))[: len(model.targets.row)]
-        shape = (model.n_actions, model.n_hypotheses)
-        return NextPatternJoint(unknown.reshape(shape), unreached.reshape(shape), reached)
+        kept = self._base.without_aspect(self._rows.belief(mass)).reshape(model.n_actions, model.n_hypotheses)
+        arrived = self._edges.arrivals(mass.ravel()[model.edge_source])
+        return NextPatternJoint.of(model, mass.sum(axis=1), kept, arrived)

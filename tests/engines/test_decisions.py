@@ -157,7 +157,7 @@ def test_aspects_from_which_an_action_was_counted_as_often_are_one_state() -> No
     assert rows.prior_weight.tolist() == [[0.5, 0.25], [1.0, 0.5], [0.0, 1.0]]
 
 
-def test_a_cell_has_one_state_for_no_edge_and_one_for_each_edge() -> None:
-    edges = EdgesInto(np.array([2, 0, 2]), 3)
-    table = edges.table(np.array([1.0, 2.0, 3.0]), np.array([0.25, 0.5, 0.125]))
-    assert table.tolist() == [[1.0, 2.0, 3.0], [0.5, 0.0, 0.25], [0.0, 0.0, 0.125]]
+def test_a_cell_has_one_state_for_each_of_several_edges_that_lead_to_it() -> None:
+    edges = EdgesInto(np.array([2, 0, 2, 3, 3, 3]), 5, np.array([0.5, 0.25, 1.0, 1.0, 1.0, 0.0]))
+    assert edges.table(np.arange(1.0, 7.0)).tolist() == [[1.0, 4.0], [3.0, 5.0], [0.0, 6.0]]
+    assert edges.arrivals(np.array([0.5, 0.5, 0.25, 0.125, 0.0625, 1.0])).tolist() == [0.125, 0.0, 0.5, 0.1875, 0.0]
