@@ -30,6 +30,12 @@ def bench(
     tests: Annotated[
         int | None, typer.Option(min=1, help="Tests of Table 1 to time; fewer than 5 are scaled up.")
     ] = None,
+    against: Annotated[
+        str | None,
+        typer.Option(
+            metavar="REVISION", help="Time the code of this revision, too, round by round beside the present."
+        ),
+    ] = None,
     given: Annotated[
         Path | None, typer.Option("--from", help="Measure nothing: show what an earlier run wrote with --json.")
     ] = None,
@@ -44,7 +50,7 @@ def bench(
     """
     options.check_json_option(json_file)
     page = None if markdown is None else _page(markdown)
-    document = _measured(_plan(quick, sizes, rounds, tests)) if given is None else _read(given)
+    document = _measured(_plan(quick, sizes, rounds, tests), against) if given is None else _read(given)
     made = _tables(document, given)
     options.write_json(document, json_file)
     if markdown is not None and page is not None:
@@ -73,9 +79,9 @@ def _size(text: str) -> int:
     return int(text)
 
 
-def _measured(plan: report.Plan) -> dict[str, Any]:
+def _measured(plan: report.Plan, against: str | None) -> dict[str, Any]:
     progress = options.console("-")
-    return report.run(plan, lambda part: progress.print(f"measuring: {part}", style="dim"))
+    return report.run(plan, lambda part: progress.print(f"measuring: {part}", style="dim"), against=against)
 
 
 def _read(path: Path) -> dict[str, Any]:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from typing import Any, Final
 
+from benchmarks import against as revisions
 from benchmarks import matching_cost, table1
 from benchmarks.lower_bound import floor
 from benchmarks.machine import description
@@ -45,7 +46,10 @@ QUICK: Final = Plan(
 
 
 def run(
-    plan: Plan, on_part: Callable[[str], None] = lambda _: None, clock: Clock = time.perf_counter
+    plan: Plan,
+    on_part: Callable[[str], None] = lambda _: None,
+    clock: Clock = time.perf_counter,
+    against: str | None = None,
 ) -> dict[str, Any]:
     """Measure everything.
 
@@ -53,10 +57,18 @@ def run(
         plan: What is measured.
         on_part: Told the name of each part before it begins.
         clock: Tells the time.
+        against: A revision of this project that is timed beside the present code, if given.
+
+    Raises:
+        InvalidInputError: There is no such revision.
 
     Returns:
         A document as JSON knows it; ``docs/file_formats.md`` says what is in it.
     """
+    compared = None
+    if against is not None:
+        figures = revisions.QUICK if plan == QUICK else revisions.FIGURES
+        compared = revisions.measure(against, figures, lambda claim: on_part(f"against {against}: {claim}"))
     machine, trials, floors = description(), [], []
     on_part(f"{min(plan.sizes):,} objects")
     remaining = sorted(plan.sizes)[1:]
@@ -65,6 +77,8 @@ def run(
         floors.append(floor(memory, plan.trial.n_rounds, clock))
         on_part(f"{remaining.pop(0):,} objects" if remaining else "equal matches")
     equal = matching_cost.measure(*plan.matches, plan.trial.n_rounds, clock)
+    on_part(f"peak memory at {max(plan.sizes):,} objects")
+    peak = {"remembered": max(plan.sizes), "bytes": revisions.peak_bytes(max(plan.sizes))}
     on_part("Table 1")
     document: dict[str, Any] = {
         "format": FORMAT,
@@ -74,6 +88,8 @@ def run(
         "trials": trials,
         "floor": floors,
         "equal_matches": equal,
+        "peak_memory": peak,
+        "against": compared,
         "table1": table1.measure(plan.tests, plan.table1_trials, plan.table1_rounds, clock),
     }
     return {**document, "targets": [target.verdict(document) for target in TARGETS]}

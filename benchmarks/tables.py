@@ -57,6 +57,7 @@ def tables(document: dict[str, Any]) -> list[Table]:
         _floor_table(document),
         _matches_table(document),
         _table1_table(document),
+        *([_against_table(document["against"])] if document.get("against") else []),
     ]
 
 
@@ -235,6 +236,23 @@ def _table1_table(document: dict[str, Any]) -> Table:
         "scaled up to five tests, the start of the processes too."
     )
     return Table("Table 1", ["engine", "processes", "seconds", "ratio", "scaled up by"], rows, [note])
+
+
+def _against_table(compared: dict[str, Any]) -> Table:
+    rows = [
+        [
+            each["claim"],
+            with_quartiles(each["milliseconds"]["before"]),
+            with_quartiles(each["milliseconds"]["now"]),
+            with_quartiles(each["times_as_quick"]),
+            f"≥ {figure(each['target'])}" if each["target"] > 1 else "–",
+            "met" if each["met"] else "**missed**",
+        ]
+        for each in compared["figures"]
+    ]
+    headings = ["", "before, ms", "now, ms", "times as quick", "target", ""]
+    note = f"Before: commit {compared['commit'][:12]}, in an environment of its own with the same libraries."
+    return Table(f"The code of revision {compared['revision']}, and that of today", headings, rows, [note])
 
 
 def _targets_table(document: dict[str, Any]) -> Table:

@@ -62,13 +62,39 @@ def milliseconds(remembered: int, name: str, preset: str, quantity: str = "decis
     return figure
 
 
-def best_peer(document: dict[str, Any]) -> float | None:
-    """Return how many times as long as ``bayes-filter`` the quickest peer takes for a decision at 100 objects."""
-    own = seconds_of(document, 100, "bayes-filter", PRESET)
-    peers = [seconds for name in PEERS if (seconds := seconds_of(document, 100, name, PRESET)) is not None]
-    if own is None or not peers:
-        return None
-    return min(statistics.median(ratios(seconds, own)) for seconds in peers)
+def best_peer(remembered: int, quantity: str = "decision") -> Figure:
+    """Return how many times as long as ``bayes-filter`` the quickest peer takes, as a figure."""
+
+    def figure(document: dict[str, Any]) -> float | None:
+        own = seconds_of(document, remembered, "bayes-filter", PRESET, quantity)
+        timed = (seconds_of(document, remembered, name, PRESET, quantity) for name in PEERS)
+        peers = [seconds for seconds in timed if seconds is not None]
+        if own is None or not peers:
+            return None
+        return min(statistics.median(ratios(seconds, own)) for seconds in peers)
+
+    return figure
+
+
+def in_floors(remembered: int) -> Figure:
+    """Return how many times its floor a decision of ``bayes-filter`` takes, as a figure."""
+
+    def figure(document: dict[str, Any]) -> float | None:
+        own = milliseconds(remembered, "bayes-filter", PRESET)(document)
+        least = [row["milliseconds"]["floor"] for row in document["floor"] if row["remembered"] == remembered]
+        return None if own is None or not least else own / float(least[0])
+
+    return figure
+
+
+def peak_memory(remembered: int) -> Figure:
+    """Return the most GB that a process of ``bayes-filter`` held, as a figure."""
+
+    def figure(document: dict[str, Any]) -> float | None:
+        measured = document.get("peak_memory")
+        return measured["bytes"] / 1e9 if measured and measured["remembered"] == remembered else None
+
+    return figure
 
 
 def naive_over_gtsam(document: dict[str, Any]) -> float | None:
@@ -104,8 +130,23 @@ TARGETS: Final = (
     Target("`gtsam`: a decision at 100 objects ≤ 20 ms", milliseconds(100, "gtsam", "paper"), 20, "ms"),
     Target("`gtsam`: the same with its factors made again ≤ 25 ms", milliseconds(100, "gtsam", "default"), 25, "ms"),
     Target("`gtsam`: ≥ 5,000 times as quick as the naive graphs", naive_over_gtsam, 5000, "times", at_most=False),
-    Target("`bayes-filter`: a decision at 100 ≤ 0.12 ms", milliseconds(100, "bayes-filter", "paper"), 0.12, "ms"),
-    Target("`bayes-filter`: ≥ 10 times as quick as the best peer", best_peer, 10, "times", at_most=False),
+    *(
+        Target(
+            f"`bayes-filter`: {words} at {remembered:,} ≥ {bound} times as quick as the best peer",
+            best_peer(remembered, quantity),
+            bound,
+            "times",
+            at_most=False,
+        )
+        for words, quantity, bounds in (
+            ("a decision", "decision", {100: 20, 1_000: 25, 10_000: 30}),
+            ("a filter step", "step", {100: 5, 1_000: 6}),
+            ("a trial", "trial", {100: 10, 1_000: 12}),
+        )
+        for remembered, bound in bounds.items()
+    ),
+    Target("`bayes-filter`: a decision at 100 ≤ 10 floors", in_floors(100), 10, "floors"),
+    Target("`bayes-filter`: most memory held at 100,000 ≤ 1 GB", peak_memory(LARGE), 1, "GB"),
     Target("`learned-structure`: a decision at 100 ≤ 3 ms", milliseconds(100, "learned-structure", "learned"), 3, "ms"),
     Target("Table 1, `gtsam`, two cores ≤ 45 s", table1_seconds("gtsam"), 45, "s"),
     Target("Table 1, `bayes-filter`, one core ≤ 3 s", table1_seconds("bayes-filter"), 3, "s"),

@@ -1,7 +1,17 @@
 import pytest
 
 from benchmarks.contestants import NaiveGraphs
-from benchmarks.targets import TARGETS, Target, best_peer, growth, milliseconds, naive_over_gtsam, table1_seconds
+from benchmarks.targets import (
+    TARGETS,
+    Target,
+    best_peer,
+    growth,
+    in_floors,
+    milliseconds,
+    naive_over_gtsam,
+    peak_memory,
+    table1_seconds,
+)
 
 
 def timed(name, preset, seconds):
@@ -20,6 +30,8 @@ def document():
     ]
     return {
         "trials": [{"remembered": 100, "contestants": rows}],
+        "floor": [{"remembered": 100, "milliseconds": {"floor": 0.2}}],
+        "peak_memory": {"remembered": 100_000, "bytes": 5e8},
         "table1": {"trials": 100, "engines": [{"engine": "gtsam", "seconds": {"median": 30.0}}]},
         "equal_matches": {"sizes": [100, 100_000], "ratio": {"decision": {"median": 1.25}}},
     }
@@ -28,7 +40,9 @@ def document():
 def test_figures_are_medians_and_ratios_of_rounds(document):
     assert milliseconds(100, "gtsam", "paper")(document) == 20
     assert naive_over_gtsam(document) == 10_000
-    assert best_peer(document) == 4
+    assert best_peer(100)(document) == 4
+    assert in_floors(100)(document) == 5
+    assert peak_memory(100_000)(document) == 0.5
     assert table1_seconds("gtsam")(document) == 30
     assert growth("decision")(document) == 1.25
 
@@ -42,7 +56,9 @@ def test_what_was_not_measured_is_not_said_to_be_met_or_missed(document):
     document["table1"]["trials"] = 5
     assert table1_seconds("gtsam")(document) is None
     document["trials"] = []
-    assert best_peer(document) is naive_over_gtsam(document) is None
+    document["floor"], document["peak_memory"] = [], None
+    assert best_peer(100)(document) is naive_over_gtsam(document) is in_floors(100)(document) is None
+    assert peak_memory(100_000)(document) is None
     assert all(target.verdict(document)["met"] is None for target in TARGETS)
 
 
