@@ -107,9 +107,7 @@ class Side:
         return self
 
     def __exit__(self, *error: object) -> None:
-        assert self._process.stdin is not None
-        self._process.stdin.close()
-        self._process.wait()
+        self._process.communicate()
 
 
 def commit_of(revision: str) -> str:
@@ -122,9 +120,7 @@ def commit_of(revision: str) -> str:
     try:
         done = subprocess.run(command, capture_output=True, text=True, check=False)
     except FileNotFoundError as error:
-        raise InvalidInputError(
-            "--against: git is not installed; expected it, and a checkout of the project"
-        ) from error
+        raise InvalidInputError("--against: git is not installed; expected it, and a checkout") from error
     if done.returncode:
         raise InvalidInputError(f"--against: {revision!r}; expected a revision in the repository at {ROOT}")
     return done.stdout.strip()

@@ -32,9 +32,7 @@ def bench(
     ] = None,
     against: Annotated[
         str | None,
-        typer.Option(
-            metavar="REVISION", help="Time the code of this revision, too, round by round beside the present."
-        ),
+        typer.Option(metavar="REVISION", help="Time the code of this revision beside the present, round by round."),
     ] = None,
     given: Annotated[
         Path | None, typer.Option("--from", help="Measure nothing: show what an earlier run wrote with --json.")

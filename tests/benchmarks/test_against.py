@@ -16,7 +16,9 @@ def repository(tmp_path, monkeypatch):
     """A project of one file, whose first revision is told apart from the second."""
     monkeypatch.setattr(against, "ROOT", tmp_path)
     (tmp_path / "benchmarks").mkdir()
-    turns = "import json, sys\nfor line in sys.stdin:\n    import project\n    print(json.dumps({'seconds': [project.SECONDS]}), flush=True)\n"
+    turns = (
+        "import sys, project\nfor line in sys.stdin:\n    print(f'{{\"seconds\": [{project.SECONDS}]}}', flush=True)\n"
+    )
     (tmp_path / "benchmarks" / "turns.py").write_text(turns)
     for seconds in (6.0, 2.0):
         (tmp_path / "project.py").write_text(f"SECONDS = {seconds}\n")
