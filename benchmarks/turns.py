@@ -11,9 +11,9 @@ import sys
 import time
 from collections.abc import Callable
 from functools import cache
+from importlib import import_module
 from typing import Any, Final
 
-from benchmarks import table1
 from benchmarks.contestants import EngineContestant, follow, large_memory
 from benchmarks.memories import course_for, remembered
 
@@ -37,13 +37,14 @@ def trial(engine: str, preset: str, n_objects: int, repeats: int) -> dict[str, l
 
 def test(engine: str, parameters: str, n_trials: int) -> dict[str, list[float]]:
     """Return the seconds of a test from an empty memory, seed 0."""
-    return _seconds([table1.TestPlan(engine=engine, n_trials=n_trials, parameters=_preset(parameters))], 1)
+    preset = _module("atg_fg.storage.presets", "atg_fg.presets").preset(parameters)
+    return _seconds([_tests().TestPlan(engine=engine, n_trials=n_trials, parameters=preset)], 1)
 
 
 def figure3(n_trials: int) -> dict[str, list[float]]:
     """Return the seconds of one test at each point of Figure 3, by two processes, their start included."""
     plans = [
-        table1.TestPlan(engine="bayes-filter", policy=policy, n_actions=n_actions, n_trials=n_trials)
+        _tests().TestPlan(engine="bayes-filter", policy=policy, n_actions=n_actions, n_trials=n_trials)
         for policy in ("entropy", "random")
         for n_actions in POINTS
     ]
@@ -52,17 +53,21 @@ def figure3(n_trials: int) -> dict[str, list[float]]:
 
 def _seconds(plans: list[Any], jobs: int) -> dict[str, list[float]]:
     start = time.perf_counter()
-    for _ in table1.run_tests([(plan, 0) for plan in plans], jobs):
+    for _ in _tests().run_tests([(plan, 0) for plan in plans], jobs):
         pass
     return {"seconds": [time.perf_counter() - start]}
 
 
-def _preset(name: str) -> Any:
+def _module(*places: str) -> Any:
+    """Return the first module that there is: revisions differ in where things are."""
     try:
-        from atg_fg.storage.presets import preset
-    except ImportError:  # in earlier revisions
-        from atg_fg.presets import preset  # type: ignore[import-not-found, no-redef]
-    return preset(name)
+        return import_module(places[0])
+    except ModuleNotFoundError:
+        return _module(*places[1:])
+
+
+def _tests() -> Any:
+    return _module("atg_fg.experiments.table1", "atg_fg.experiments")
 
 
 def peak() -> dict[str, list[float]]:

@@ -26,7 +26,19 @@ def test_a_quick_run_measures_everything_and_writes_it(run, folder, page):
     document = json.loads((folder / "bench.json").read_text())
     assert (document["format"], document["version"]) == ("atg-fg/bench", 1)
     assert set(document) == {
-        *("format", "version", "parameters", "machine", "trials", "floor", "equal_matches", "table1", "targets")
+        *(
+            "format",
+            "version",
+            "parameters",
+            "machine",
+            "trials",
+            "floor",
+            "equal_matches",
+            "table1",
+            "targets",
+            "against",
+            "peak_memory",
+        )
     }
     assert platform.node() not in json.dumps(document).split('"')
     (size,) = document["trials"]
