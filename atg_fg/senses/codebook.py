@@ -24,6 +24,8 @@ from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.log_math import log_sum_exp
 from atg_fg.core.patterns import MISSING, FloatArray, IntArray
 
+#: Classes that a codebook can have, at most.
+MOST_CLASSES: Final = 1000
 _LOG_TAU: Final = float(np.log(2 * np.pi))
 #: Rounds of moving looks, of merging and of splitting; they end before if nothing changes.
 _MOST_ROUNDS: Final = 8
@@ -46,7 +48,7 @@ class Codebook:
 
     Args:
         between: ψ, shape [D].
-        most: V, the numbers that there are.
+        most: V, the numbers that there are, at most ``MOST_CLASSES``.
         within: σ².
         concentration: γ.
 
@@ -62,7 +64,7 @@ class Codebook:
         self.between = np.array(between, dtype=np.float64)
         if self.between.ndim != 1 or not len(self.between) or not (self.between > 0).all():
             raise InvalidInputError(f"codebook: between {between!r:.60}; expected variances above 0")
-        self.most = whole_number(most, "codebook: most", 1)
+        self.most = whole_number(most, "codebook: classes", 1, MOST_CLASSES)
         self.within = number(within, "codebook: within", least=1e-12)
         self.concentration = number(concentration, "codebook: concentration", least=1e-12)
         self.counts = np.zeros(self.most)

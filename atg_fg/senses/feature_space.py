@@ -17,6 +17,8 @@ from atg_fg.core.checks import whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import FloatArray, read_only
 
+#: D, at most.
+MOST_DIMENSIONS: Final = 1000
 #: Directions in which looks scatter less than this share of the widest one are left out: there is nothing in them.
 _LEAST_SCATTER: Final = 1e-3
 #: Share of the mean variance that is added to each direction within classes, so that none is trusted without limit.
@@ -54,6 +56,8 @@ class FeatureSpace:
             self.projection.shape[1:],
         ):
             raise InvalidInputError(f"feature space: shapes {shapes}; expected [F], [F, D] and [D]")
+        if not 1 <= len(self.between) <= MOST_DIMENSIONS:
+            raise InvalidInputError(f"feature space: {len(self.between)} dimensions; expected 1 to {MOST_DIMENSIONS}")
         finite = all(np.isfinite(each).all() for each in (self.mean, self.projection, self.between))
         if not finite or not (self.between > 0).all():
             raise InvalidInputError("feature space: expected finite numbers, and variances above 0")

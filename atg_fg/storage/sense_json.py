@@ -58,7 +58,7 @@ def read_sense(value: Any, assumptions: Assumptions, place: str) -> AppearanceSe
         space = FeatureSpace(
             plain_text(fields["features"], "features"),
             np.array(_numbers(fields["mean"], "mean", len(rows))),
-            np.array(projection).reshape(-1, width),
+            np.array(projection, dtype=np.float64).reshape(len(rows), width),
             np.array(_numbers(fields["between"], "between", width)),
         )
         sense = AppearanceSense(space, assumptions.alphabet, **settings)

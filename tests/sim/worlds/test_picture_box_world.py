@@ -7,16 +7,19 @@ import numpy as np
 import pytest
 
 from atg_fg.core.errors import InvalidInputError, UnknownNameError
+from atg_fg.core.goals import Goal
 from atg_fg.core.memory import RobotMemory
 from atg_fg.engines import begin_trial
+from atg_fg.experiments.exploration import explore
 from atg_fg.experiments.table1 import TestPlan, run_test
 from atg_fg.experiments.trial import learn_from, run_trial
 from atg_fg.learning.structured_memory import memory_for
-from atg_fg.policies import RandomPolicy
+from atg_fg.policies import ExplorationPolicy, RandomPolicy
+from atg_fg.policies.goal import GoalPolicy
 from atg_fg.senses.appearance import AppearanceSense
 from atg_fg.storage.memory_files import load_memory, open_memory, save_memory
 from atg_fg.storage.presets import preset
-from atg_fg.worlds.arcube import canonical
+from atg_fg.worlds.arcube import FRONT, ORIENTATIONS, canonical
 from atg_fg.worlds.registry import assumptions_of, make_world_with, sense_of
 from sim.bodies.pictures import PLAIN, make_picture_boxes
 
@@ -153,3 +156,18 @@ def test_options_of_nonsense_are_refused(options, message):
 def test_there_is_one_render_mode():
     with pytest.raises(UnknownNameError, match="human"):
         make_world_with("picture-box", 3, 0, render_mode="human")
+
+
+def test_a_goal_can_be_given_by_a_crop(world):
+    memory = memory_of(world)
+    explore(memory, world, 2, ExplorationPolicy(), 60, np.random.default_rng(0))
+    world.reset(seed=11, options={"object": 1, "orientation": 3})
+    wanted = world.get_wrapper_attr("crops")[0]
+    symbol = memory.sense.symbol_of(world.get_wrapper_attr("features")(wanted))
+    shown = world.get_wrapper_attr("boxes").faces[1]
+    goal = Goal.of_slots(memory.assumptions.alphabet, {"front": symbol})
+    inference = begin_trial("bayes-filter", memory, preset("default"))
+    options = {"object": 1, "orientation": 0}
+    record = run_trial(world, inference, GoalPolicy(goal), 20, np.random.default_rng(0), reset_options=options)
+    assert record.steps[-1].detection[0] == symbol
+    assert record.steps[-1].truth["pattern"][0] == shown[ORIENTATIONS[3][FRONT]]
