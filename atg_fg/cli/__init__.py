@@ -27,6 +27,9 @@ COMMANDS: Final = {
         "doctor": "atg_fg.cli.doctor:doctor",
     },
     "Your data": {
+        "learn": "atg_fg.cli.recordings:learn",
+        "recognise": "atg_fg.cli.recordings:recognise",
+        "recordings": "atg_fg.cli.recordings:app",
         "replay": "atg_fg.cli.trials:replay",
         "explain": "atg_fg.cli.explain:explain",
         "uai": "atg_fg.cli.uai:app",

@@ -30,7 +30,7 @@ class Story:
     def tell(self, step: TrialStep) -> None:
         """Print one look, the belief after it and the action chosen."""
         seen = ", ".join(
-            f"{slot} {'not seen' if symbol is None else symbol}"
+            f"{slot} {'not seen' if symbol is None else self.assumptions.alphabet.name_of(symbol)}"
             for slot, symbol in zip(self.assumptions.alphabet.slots, step.detection, strict=True)
         )
         self.console.print(f"look {self._time}: {seen}", style="bold")

@@ -12,7 +12,7 @@ from atg_fg.core.assumptions import MAX_NUMBER, Assumptions
 from atg_fg.core.checks import whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import IntArray, Pattern
-from atg_fg.core.table import Cell, Table, shortened, symbols_text
+from atg_fg.core.table import Cell, Table, shortened
 
 #: Node of the networkx view that stands for all unobserved aspects.
 COLLECTION_NODE = "collection"
@@ -222,10 +222,10 @@ class AspectTransitionGraph:
         ways: dict[tuple[int, int], list[str]] = {}
         for (source, action, target), count in sorted(self._counts.items()):
             times = "" if count == 1 else f" ×{count}"
-            ways.setdefault((source, action), []).append(f"{symbols_text(aspects[target])}{times}")
+            ways.setdefault((source, action), []).append(f"{assumptions.alphabet.text(aspects[target])}{times}")
         rows: list[tuple[Cell, ...]] = [
             (
-                symbols_text(pattern),
+                assumptions.alphabet.text(pattern),
                 *("; ".join(ways.get((aspect, action), ["·"])) for action in range(len(assumptions.actions))),
             )
             for aspect, pattern in enumerate(aspects)

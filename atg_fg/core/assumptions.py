@@ -41,6 +41,12 @@ class Assumptions:
                 "since the aspects of one object are unique"
             )
 
+    def action_of(self, action: int | str, place: str = "action") -> int:
+        """Return the index of an action given by index or name, or raise ``InvalidInputError`` naming ``place``."""
+        if isinstance(action, str):
+            return self.action_index(action, place)
+        return whole_number(action, place, 0, len(self.actions) - 1)
+
     def action_index(self, name: str, place: str = "action") -> int:
         """Return the index of an action, or raise ``InvalidInputError`` naming ``place``."""
         if not isinstance(name, str) or name not in self.actions:

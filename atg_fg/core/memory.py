@@ -7,6 +7,7 @@ from typing import Final
 
 from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.assumptions import Assumptions
+from atg_fg.core.checks import plain_text
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.merging import Merge, check_merges
 from atg_fg.core.patterns import Confidences, Detection, Evidence, SlotLikelihoods
@@ -71,21 +72,28 @@ class RobotMemory(Persistent):
         return max(self.assumptions.n_objects - len(self), 1)
 
     @one_transaction
-    def learn(self, patterns: Sequence[int | None], actions: Sequence[int], matched: str | None) -> str:
+    def learn(
+        self, patterns: Sequence[int | None], actions: Sequence[int], matched: str | None, name: str | None = None
+    ) -> str:
         """Learn from a trial and return the name of the ATG it went to.
 
         Args:
             patterns: Index of the pattern seen at each time, ``None`` where it was not complete, length t + 1.
             actions: Index of the action between each two, length t.
             matched: Name of the ATG to extend, or ``None`` if the object was judged novel.
+            name: Of the ATG of a novel object; the next number if not given.
 
         Raises:
             UnknownNameError: There is no such ATG.
-            InvalidInputError: Lengths or indices that do not fit, or a novel object of which no pattern was seen whole.
+            InvalidInputError: Lengths or indices that do not fit, a novel object of which no pattern was seen whole, or
+                a name that is taken.
         """
         if matched is None and all(pattern is None for pattern in patterns):
             raise InvalidInputError("learn: no pattern was seen whole; expected at least one of a novel object")
-        graph = AspectTransitionGraph(self._new_name(), self.assumptions) if matched is None else self[matched].copy()
+        if matched is None:
+            graph = AspectTransitionGraph(self._free_name(name), self.assumptions)
+        else:
+            graph = self[matched].copy()
         graph.learn(patterns, actions)
         self._graphs[graph.name] = graph
         return graph.name
@@ -97,6 +105,8 @@ class RobotMemory(Persistent):
         actions: Sequence[int],
         confidences: Sequence[Confidences] = (),
         likelihoods: Sequence[SlotLikelihoods] = (),
+        *,
+        taught: bool = False,
     ) -> str:
         """Learn from a raw trial what all objects share: nothing, in a memory that takes each object by itself.
 
@@ -108,6 +118,7 @@ class RobotMemory(Persistent):
             actions: Index of the action between each two, length t.
             confidences: How sure the detector was of each symbol at each look; none if it never says.
             likelihoods: Of the symbols in each slot at each look, where evidence was no symbol; none if it always was.
+            taught: Whether someone said of which object the trial is, so that nothing changes hands because of it.
         """
         return name
 
@@ -163,6 +174,31 @@ class RobotMemory(Persistent):
             patterns = [Evidence.of_detection(self.assumptions.alphabet, each).pattern for each in detections]
             graph.learn(patterns, list(actions))
         return graph
+
+    @one_transaction
+    def rename(self, old: str, new: str) -> None:
+        """Give an ATG another name; all that was learned stays with it.
+
+        Raises:
+            UnknownNameError: There is no ATG of the old name.
+            InvalidInputError: The new name is taken or is none, or the ATG has taken part in a merge.
+        """
+        graph, new = self[old], self._free_name(plain_text(new, "name"))
+        if any(old in (merge.kept.name, merge.dropped.name) for merge in self._merges):
+            raise InvalidInputError(f"rename: {old!r} has taken part in a merge; expected that to be undone first")
+        renamed = AspectTransitionGraph(new, self.assumptions)
+        renamed.absorb(graph)
+        self._graphs = {each.name: each for each in (renamed if name == old else g for name, g in self._graphs.items())}
+        self._rename_shared(old, new)
+
+    def _rename_shared(self, old: str, new: str) -> None:
+        """Let what all objects share know of another name."""
+
+    def _free_name(self, name: str | None) -> str:
+        """Return a name for a new ATG: the one that is wanted, if it is free."""
+        if name is not None and (name in self._graphs or name in self._dropped):
+            raise InvalidInputError(f"memory: name {name!r} is taken; expected one that no ATG has or had")
+        return self._new_name() if name is None else name
 
     def _new_name(self) -> str:
         number = len(self)

@@ -75,21 +75,30 @@ class PatternAlphabet:
         slots: Names of the slots, all different.
         n_symbols: Number of symbols; they are numbered from 0.
         exclusive: Whether a symbol is in one slot only, as a tag on a cube is; if not, patterns may repeat it.
+        names: Of the symbols, by which they can be given wherever a number can; none if they have numbers only.
+        is_open: Whether there may be symbols that were not met yet, which ``extended`` adds.
 
     Raises:
-        InvalidInputError: No slots, repeated slots, fewer symbols than slots that exclude each other, or over
-            ``MAX_PATTERNS`` patterns.
+        InvalidInputError: No slots, repeated slots, fewer symbols than slots that exclude each other, other names than
+            one a symbol, an open alphabet without names, or over ``MAX_PATTERNS`` patterns.
     """
 
     slots: tuple[str, ...]
     n_symbols: int
     exclusive: bool = True
+    names: tuple[str, ...] = ()
+    is_open: bool = False
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "slots", distinct_names(self.slots, "slots"))
         object.__setattr__(self, "n_symbols", whole_number(self.n_symbols, "n_symbols"))
-        if not isinstance(self.exclusive, bool):
-            raise InvalidInputError(f"exclusive: {self.exclusive!r}; expected true or false")
+        for field in ("exclusive", "is_open"):
+            if not isinstance(getattr(self, field), bool):
+                raise InvalidInputError(f"{field}: {getattr(self, field)!r}; expected true or false")
+        if self.names or self.is_open:
+            object.__setattr__(self, "names", distinct_names(self.names, "names of symbols"))
+            if len(self.names) != self.n_symbols:
+                raise InvalidInputError(f"names of symbols: {len(self.names)}; expected {self.n_symbols}, one a symbol")
         least = len(self.slots) if self.exclusive else 1
         if self.n_symbols < least:
             raise InvalidInputError(
@@ -103,6 +112,38 @@ class PatternAlphabet:
                     f"n_symbols: {self.n_symbols} symbols in {len(self.slots)} slots make too many patterns; "
                     f"expected at most {MAX_PATTERNS}"
                 )
+
+    @classmethod
+    def named(
+        cls, slots: Sequence[str], names: Sequence[str], *, exclusive: bool = True, is_open: bool = False
+    ) -> PatternAlphabet:
+        """Return the alphabet of the symbols with these names; for the rest see the class."""
+        return cls(tuple(slots), len(names), exclusive, tuple(names), is_open)
+
+    def extended(self, names: Iterable[str]) -> PatternAlphabet:
+        """Return an open alphabet with those of the names that it lacks, after its own.
+
+        Raises:
+            InvalidInputError: The alphabet is not open, and lacks one.
+        """
+        new = [name for name in dict.fromkeys(names) if name not in self._number_of]
+        if new and not self.is_open:
+            raise InvalidInputError(f"symbol {new[0]!r}; expected one of: {', '.join(self.names)}")
+        return replace(self, n_symbols=self.n_symbols + len(new), names=(*self.names, *new)) if new else self
+
+    @cached_property
+    def _number_of(self) -> dict[str, int]:
+        return {name: number for number, name in enumerate(self.names)}
+
+    def name_of(self, symbol: int | None) -> str:
+        """Return the name of a symbol, its number if it has none, or a dash where none was seen."""
+        if symbol is None:
+            return "–"
+        return self.names[symbol] if self.names else str(symbol)
+
+    def text(self, pattern: Sequence[int | None]) -> str:
+        """Return the names of a pattern's symbols, or of what was seen of it, in brackets."""
+        return f"({', '.join(map(self.name_of, pattern))})"
 
     def __len__(self) -> int:
         """|𝒵|, the number of patterns."""
@@ -126,7 +167,7 @@ class PatternAlphabet:
     def _index_of(self) -> dict[Detection, int]:
         return {pattern: index for index, pattern in enumerate(self.patterns)}
 
-    def index(self, pattern: Sequence[int]) -> int:
+    def index(self, pattern: Sequence[int | str]) -> int:
         """Return the index of a pattern.
 
         Raises:
@@ -144,15 +185,15 @@ class PatternAlphabet:
         result: FloatArray = np.array(sums) * scale[:, None]
         return result
 
-    def check_pattern(self, pattern: Sequence[int], place: str = "pattern") -> Pattern:
+    def check_pattern(self, pattern: Sequence[int | str], place: str = "pattern") -> Pattern:
         """Return ``pattern`` as a tuple of integers, or raise ``InvalidInputError`` naming ``place``."""
         detection = self.check_detection(pattern, place)
         if None in detection:
             raise InvalidInputError(f"{place}: {list(pattern)!r} has a missing symbol; expected a complete pattern")
         return tuple(symbol for symbol in detection if symbol is not None)
 
-    def check_detection(self, detection: Sequence[int | None], place: str = "detection") -> Detection:
-        """Return ``detection`` as a tuple, or raise ``InvalidInputError`` naming ``place``."""
+    def check_detection(self, detection: Sequence[int | str | None], place: str = "detection") -> Detection:
+        """Return the numbers of the symbols of ``detection``, or raise ``InvalidInputError`` naming ``place``."""
         if isinstance(detection, str) or not hasattr(detection, "__len__") or len(detection) != len(self.slots):
             raise InvalidInputError(
                 f"{place}: {brief(detection)}; expected one entry for each of {len(self.slots)} slots: "
@@ -163,6 +204,12 @@ class PatternAlphabet:
             if symbol is None:
                 symbols.append(None)
                 continue
+            if isinstance(symbol, str) and self.names:
+                if symbol not in self._number_of:
+                    raise InvalidInputError(
+                        f"{place}, slot {slot!r}: {brief(symbol)}; expected one of: {', '.join(self.names)}"
+                    )
+                symbol = self._number_of[symbol]
             if isinstance(symbol, (bool, np.bool_)) or not isinstance(symbol, (int, np.integer)):
                 raise InvalidInputError(f"{place}, slot {slot!r}: {brief(symbol)}; expected a whole number or null")
             if not 0 <= symbol < self.n_symbols:
@@ -207,13 +254,13 @@ class Evidence:
 
     @classmethod
     def of_detection(
-        cls, alphabet: PatternAlphabet, detection: Sequence[int | None], confidences: Sequence[float | None] = ()
+        cls, alphabet: PatternAlphabet, detection: Sequence[int | str | None], confidences: Sequence[float | None] = ()
     ) -> Evidence:
         """Evidence of a detection, ``None`` in each slot where nothing was seen.
 
         Args:
             alphabet: The patterns.
-            detection: The symbol in each slot.
+            detection: The symbol in each slot, its number or its name.
             confidences: Of each symbol, for models that learn what they mean; the likelihood takes no notice of them.
 
         Raises:
@@ -239,7 +286,7 @@ class Evidence:
         cls,
         alphabet: PatternAlphabet,
         likelihoods: Sequence[ArrayLike | None],
-        detection: Sequence[int | None] = (),
+        detection: Sequence[int | str | None] = (),
         confidences: Sequence[float | None] = (),
     ) -> Evidence:
         """Evidence that is a likelihood of the symbols of some slots, and of a detection in the others.

@@ -6,11 +6,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final, Literal, NamedTuple, TypeAlias, get_args
 
+import numpy as np
+
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.core.patterns import Confidences, Detection, FloatArray
-from atg_fg.core.table import Bar, Cell, Table, shortened, symbols_text
+from atg_fg.core.patterns import Confidences, Detection, Evidence, FloatArray
+from atg_fg.core.table import Bar, Cell, Table, shortened
 
 #: How a trial can end.
 Verdict: TypeAlias = Literal["novel", "known", "lost", "undecided"]
@@ -106,6 +108,37 @@ class TrialRecord:
     steps: list[TrialStep] = field(default_factory=list)
     lost_truth: dict[str, Any] | None = None
     mistakes: list[Mistake] = field(default_factory=list)
+
+    @classmethod
+    def from_looks(
+        cls, assumptions: Assumptions, looks: Sequence[Evidence], actions: Sequence[int | str], name: str | None = None
+    ) -> TrialRecord:
+        """Return the record of a trial that nobody inferred anything from: what was seen and done is all there is.
+
+        Args:
+            assumptions: Of the memory that is to learn from it.
+            looks: Evidence of each look, at least one, t + 1 of them.
+            actions: What was done between each two, index or name, t of them.
+            name: Of the object, if it is known; it is then the belief at each look, else *unseen* is.
+
+        Raises:
+            InvalidInputError: Lengths that do not fit, an action that there is not, or evidence over another alphabet.
+        """
+        if not looks or len(actions) != len(looks) - 1:
+            raise InvalidInputError(f"trial: {len(looks)} looks, {len(actions)} actions; expected one look more")
+        belief = IdentityBelief.of(
+            np.array([1.0, 0.0] if name else [1.0]), max(assumptions.n_objects - (name is not None), 1)
+        )
+        record = cls(() if name is None else (name,), assumptions)
+        for time, evidence in enumerate(looks):
+            evidence.check(len(assumptions.alphabet))
+            action = None if time == len(actions) else assumptions.action_of(actions[time], f"trial, action {time}")
+            seen = evidence.detection or (None,) * len(assumptions.alphabet.slots)
+            truth: dict[str, Any] = {} if name is None else {"object": name}
+            truth |= {"confidences": evidence.confidences} if evidence.confidences else {}
+            truth |= {"likelihoods": evidence.slots} if evidence.slots else {}
+            record.steps.append(TrialStep(seen, evidence.pattern, belief, 0.0, truth, action=action))
+        return record
 
     @property
     def belief(self) -> IdentityBelief:
@@ -329,7 +362,10 @@ class TrialSummary:
     def table(self) -> Table:
         """Return how the trial ended, what it was about, and what was seen."""
         title = f"Trial of {len(self.actions)} actions: {self.verdict}{_of(self.matched)}"
-        seen = "; ".join(symbols_text(detection) for detection in self.detections[:_LOOKS])
+        seen = "; ".join(
+            f"({', '.join('–' if symbol is None else str(symbol) for symbol in detection)})"
+            for detection in self.detections[:_LOOKS]
+        )
         presented = str(self.steps[0].truth.get("object", "–"))
         return Table(title, ("object presented", "seen"), ((presented, seen),))
 
@@ -348,7 +384,7 @@ def _step_row(number: int, step: TrialStep, record: TrialRecord) -> tuple[Cell, 
     then += [] if step.purpose is None else [f"({step.purpose})"]
     return (
         str(number),
-        symbols_text(step.detection),
+        record.assumptions.alphabet.text(step.detection),
         name,
         Bar(share, f"{share:.3f}"),
         Bar(belief.unseen, f"{belief.unseen:.3f}"),

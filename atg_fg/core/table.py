@@ -11,8 +11,6 @@ from dataclasses import dataclass
 from html import escape
 from typing import Final, TypeAlias
 
-from atg_fg.core.patterns import Detection
-
 _LINE: Final = "1px solid rgba(127, 127, 127, 0.35)"
 
 
@@ -91,8 +89,3 @@ def _cell(cell: Cell) -> str:
 
 #: Rows that are shown of a long table of results.
 ROWS: Final = 40
-
-
-def symbols_text(pattern: Detection | Sequence[int]) -> str:
-    """Return the symbols of a pattern, or of what was seen of it, in brackets."""
-    return f"({', '.join('–' if symbol is None else str(symbol) for symbol in pattern)})"

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from atg_fg.core.patterns import FloatArray
+from atg_fg.core.patterns import FloatArray, PatternAlphabet
 from atg_fg.display.figures import GREY, INK, PALETTE
 
 if TYPE_CHECKING:
@@ -84,7 +84,7 @@ def draw_arrow(axes: Axes, start: FloatArray, end: FloatArray, bend: float, shri
 
 def draw_aspect(
     axes: Axes,
-    slots: tuple[str, ...],
+    alphabet: PatternAlphabet,
     symbols: Sequence[int | None],
     place: FloatArray,
     images: Images,
@@ -94,14 +94,14 @@ def draw_aspect(
 
     Args:
         axes: Where to draw.
-        slots: Their names.
+        alphabet: Names slots and symbols.
         symbols: What each slot shows; where it is ``None`` a question mark is drawn.
         place: The middle of the aspect.
-        images: Grey image of each symbol, shape [pixels, pixels]; its number is written where there is none.
+        images: Grey image of each symbol, shape [pixels, pixels]; its name is written where there is none.
         look: How to draw it.
     """
-    draw = _draw_cube if slots == CUBE_SLOTS else _draw_tiles
-    return draw(axes, slots, symbols, place, images, look or Look())
+    draw = _draw_cube if alphabet.slots == CUBE_SLOTS else _draw_tiles
+    return draw(axes, alphabet, symbols, place, images, look or Look())
 
 
 def draw_frame(axes: Axes, outline: tuple[FloatArray, FloatArray]) -> None:
@@ -117,7 +117,7 @@ def draw_frame(axes: Axes, outline: tuple[FloatArray, FloatArray]) -> None:
 
 
 def _draw_cube(
-    axes: Axes, slots: tuple[str, ...], symbols: Sequence[int | None], place: FloatArray, images: Images, look: Look
+    axes: Axes, alphabet: PatternAlphabet, symbols: Sequence[int | None], place: FloatArray, images: Images, look: Look
 ) -> tuple[FloatArray, FloatArray]:
     """Draw the front and the top of a cube with their symbols, and a blank side."""
     side = 0.78
@@ -125,22 +125,27 @@ def _draw_cube(
     right, up, back = np.array([side, 0.0]), np.array([0.0, side]), np.full(2, side * _SHEAR)
     front, top = symbols
     _draw_face(axes, low + right, back, up, look, look.side)
-    _draw_symbol(axes, low, right, up, front, images, look)
-    _draw_symbol(axes, low + up, right, back, top, images, look)
+    _draw_symbol(axes, low, right, up, front, _text(alphabet, front), images, look)
+    _draw_symbol(axes, low + up, right, back, top, _text(alphabet, top), images, look)
     return low, low + right + up + back
 
 
 def _draw_tiles(
-    axes: Axes, slots: tuple[str, ...], symbols: Sequence[int | None], place: FloatArray, images: Images, look: Look
+    axes: Axes, alphabet: PatternAlphabet, symbols: Sequence[int | None], place: FloatArray, images: Images, look: Look
 ) -> tuple[FloatArray, FloatArray]:
     """Draw one tile a slot in a row, with the slot's name above."""
     side = min(0.6, 1.3 / len(symbols))
     low = place - np.array([side * len(symbols), side]) / 2
-    for number, (symbol, slot) in enumerate(zip(symbols, slots, strict=True)):
+    for number, (symbol, slot) in enumerate(zip(symbols, alphabet.slots, strict=True)):
         corner = low + np.array([number * side, 0.0])
-        _draw_symbol(axes, corner, np.array([side, 0.0]), np.array([0.0, side]), symbol, images, look)
+        right, up = np.array([side, 0.0]), np.array([0.0, side])
+        _draw_symbol(axes, corner, right, up, symbol, _text(alphabet, symbol), images, look)
         axes.annotate(slot, (corner[0] + side / 2, corner[1] + side + 0.05), ha="center", fontsize=6.5, color=GREY)
     return low, low + np.array([side * len(symbols), side])
+
+
+def _text(alphabet: PatternAlphabet, symbol: int | None) -> str:
+    return "?" if symbol is None else alphabet.name_of(symbol)
 
 
 def _draw_face(axes: Axes, corner: FloatArray, right: FloatArray, up: FloatArray, look: Look, color: str) -> None:
@@ -154,7 +159,14 @@ def _draw_face(axes: Axes, corner: FloatArray, right: FloatArray, up: FloatArray
 
 
 def _draw_symbol(
-    axes: Axes, corner: FloatArray, right: FloatArray, up: FloatArray, symbol: int | None, images: Images, look: Look
+    axes: Axes,
+    corner: FloatArray,
+    right: FloatArray,
+    up: FloatArray,
+    symbol: int | None,
+    text: str,
+    images: Images,
+    look: Look,
 ) -> None:
     """Draw a face with a symbol in the middle three quarters of it."""
     from matplotlib.transforms import Affine2D
@@ -169,5 +181,5 @@ def _draw_symbol(
         picture.set_transform(face_to_data + axes.transData)
     else:
         middle = corner + (right + up) / 2
-        text = "?" if symbol is None else str(symbol)
-        axes.annotate(text, tuple(middle), ha="center", va="center", fontsize=13, color=look.ink, zorder=5)
+        size = min(13.0, 42.0 / len(text))
+        axes.annotate(text, tuple(middle), ha="center", va="center", fontsize=size, color=look.ink, zorder=5)

@@ -63,7 +63,7 @@ def draw_atg(
         _draw_observed(axes, graph, places, path)
         _draw_collection(axes, graph)
         for aspect, pattern in enumerate(graph.aspects):
-            outline = draw_aspect(axes, graph.assumptions.alphabet.slots, pattern, places[aspect], symbol_images or {})
+            outline = draw_aspect(axes, graph.assumptions.alphabet, pattern, places[aspect], symbol_images or {})
             if aspect == highlight:
                 draw_frame(axes, outline)
         axes.set(xlim=(-extent, extent), ylim=(-extent, extent))  # images move the limits

@@ -9,7 +9,7 @@ import numpy as np
 
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.core.patterns import FloatArray
+from atg_fg.core.patterns import FloatArray, PatternAlphabet
 from atg_fg.display.aspect_picture import INCHES_PER_UNIT, Images, Look, action_color, draw_arrow, draw_aspect
 from atg_fg.display.figures import GREY, INK, figure_class, plot_style
 from atg_fg.display.ring_layout import Node, ring_layout
@@ -74,7 +74,7 @@ def draw_completed_atg(
         _draw_edges(axes, graph, assumptions, places)
         usual = _usual_probability(graph)
         for node, data in graph.nodes(data=True):
-            _draw_node(axes, data, places[node], assumptions.alphabet.slots, symbol_images or {}, usual)
+            _draw_node(axes, data, places[node], assumptions.alphabet, symbol_images or {}, usual)
         axes.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), aspect="equal")
         _draw_head(figure, graph, assumptions)
     return figure
@@ -120,10 +120,10 @@ def _usual_probability(graph: CompletedGraph) -> str | None:
 
 
 def _draw_node(
-    axes: Axes, data: dict[str, Any], place: FloatArray, slots: tuple[str, ...], images: Images, usual: str | None
+    axes: Axes, data: dict[str, Any], place: FloatArray, alphabet: PatternAlphabet, images: Images, usual: str | None
 ) -> None:
     status = data["status"]
-    draw_aspect(axes, slots, data["symbols"], place, images, _LOOKS[status])
+    draw_aspect(axes, alphabet, data["symbols"], place, images, _LOOKS[status])
     probability = probability_text(data["probability"])
     if status == PREDICTED and probability != usual:
         axes.annotate(

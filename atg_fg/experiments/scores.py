@@ -54,9 +54,11 @@ class Score:
 
     Args:
         made_from: The object that each ATG was made from, by its name, if the memory is not empty at first.
+        learns: Whether the memory learns from the trials; if not, an object that was new stays so.
     """
 
-    def __init__(self, made_from: Mapping[str, object] | None = None) -> None:
+    def __init__(self, made_from: Mapping[str, object] | None = None, *, learns: bool = True) -> None:
+        self._learns = learns
         self.n_trials = self.identified = self.recognised = self.judged_known = self.successes = 0
         self.lost = self.undecided = 0
         self._actions: list[int] = []
@@ -82,7 +84,8 @@ class Score:
         self.judged_known += seen_before and identified
         self.recognised += seen_before and identified and right_match
         self.successes += identified and (right_match or not seen_before)
-        self._presented.add(trial.object)
+        if self._learns:
+            self._presented.add(trial.object)
         if learned is not None:
             self._learned_from.append((trial.object, seen_before))
             if trial.verdict == "novel":

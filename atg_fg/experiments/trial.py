@@ -150,18 +150,23 @@ def learn_from(record: TrialRecord | TrialSummary, memory: RobotMemory) -> str |
     return name
 
 
-def learn_steps(memory: RobotMemory, trial: TrialSummary, matched: str | None) -> str:
+def learn_steps(
+    memory: RobotMemory, trial: TrialSummary, matched: str | None, name: str | None = None, *, taught: bool = False
+) -> str:
     """Let a memory learn from the looks and actions of a trial; return the name of the ATG.
 
     Args:
         memory: What learns.
         trial: What was seen and done.
         matched: Name of the ATG that the object is of, ``None`` if it is new.
+        name: Of the ATG of a new object; the next number if not given.
+        taught: Whether someone said of which object the trial is.
     """
     actions = [memory.assumptions.action_index(action) for action in trial.actions[: len(trial.steps) - 1]]
     looks = [step.truth for step in trial.steps]
-    name = memory.learn(list(trial.patterns), actions, matched)
-    name = memory.learn_shared(name, trial.detections, actions, trial.confidences, likelihoods_of(looks))
+    name = memory.learn(list(trial.patterns), actions, matched, name)
+    likelihoods = likelihoods_of(looks)
+    name = memory.learn_shared(name, trial.detections, actions, trial.confidences, likelihoods, taught=taught)
     readings = readings_of(looks)
     if readings and memory.sense is not None:
         memory.learn_readings(name, readings, trial.detections, actions)

@@ -11,7 +11,6 @@ from typing import Any, ClassVar, NamedTuple, Self
 import numpy as np
 
 from atg_fg.core.belief import SHOWN, BeliefTable, IdentityBelief
-from atg_fg.core.checks import whole_number
 from atg_fg.core.errors import ImpossibleEvidenceError, InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
@@ -105,18 +104,18 @@ class Inference(ABC):
         self._log_scale += log_scale
         self._protect()
 
-    def act(self, action: int) -> None:
-        """Predict the effect of an action a_{t+1}.
+    def act(self, action: int | str) -> None:
+        """Predict the effect of an action a_{t+1}, its index or its name.
 
         Raises:
             InvalidInputError: It is an observation's turn, or there is no such action.
         """
         if self.history.awaits_evidence:
             raise InvalidInputError("trial: an action without an observation before it; expected an observation")
-        whole_number(action, "action", 0, self.model.n_actions - 1)
-        self.history.actions.append(int(action))
+        index = self.memory.assumptions.action_of(action)
+        self.history.actions.append(index)
         try:
-            self._act(int(action))
+            self._act(index)
         except BaseException:
             self.history.actions.pop()
             raise

@@ -102,6 +102,8 @@ class StructuredMemory(RobotMemory):
         actions: Sequence[int],
         confidences: Sequence[Confidences] = (),
         likelihoods: Sequence[SlotLikelihoods] = (),
+        *,
+        taught: bool = False,
     ) -> str:
         """Keep a raw trial, and learn from it what all objects share; return the name of the ATG that it is of now.
 
@@ -115,6 +117,7 @@ class StructuredMemory(RobotMemory):
             confidences: How sure the detector was of each symbol at each look; none if it never says.
             likelihoods: Of the symbols in each slot at each look, where evidence was no symbol; none if it always was.
                 The model in which looks err learns from the whole of them.
+            taught: Whether someone said of which object the trial is, so that nothing changes hands because of it.
 
         Raises:
             UnknownNameError: There is no such ATG.
@@ -128,7 +131,7 @@ class StructuredMemory(RobotMemory):
         if before > -OUTDONE or len(self.learner.trials).bit_count() == 1:
             self.evidence.learn()
             self._gain = self._evident_gain()
-            if self.erring:
+            if self.erring and not taught:
                 self._mend()
         return self.learner.owners[-1]
 
@@ -261,6 +264,14 @@ class StructuredMemory(RobotMemory):
     def _unmerge_shared(self, merge: Merge) -> None:
         self.learner.hand_over(merge.trials, merge.dropped.name)
         self.evidence.forget_verdict()
+
+    def _rename_shared(self, old: str, new: str) -> None:
+        self.learner.hand_over([number for number, owner in enumerate(self.learner.owners) if owner == old], new)
+        self.evidence.forget_verdict()
+        self._reassignments = [
+            each._replace(old=new if each.old == old else each.old, new=new if each.new == old else each.new)
+            for each in self._reassignments
+        ]
 
     def become(self, other: RobotMemory) -> None:
         """Have what another memory has, under the same assumptions; if that has no structure, none is learned yet."""

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, TypeAlias
 
 from atg_fg.core.assumptions import Assumptions
-from atg_fg.core.patterns import Detection
+from atg_fg.core.patterns import Detection, PatternAlphabet
 from atg_fg.core.table import Table
 
 #: (name, value) pairs in the order in which they are shown.
@@ -165,9 +165,26 @@ class Report:
             "slots": list(self.assumptions.alphabet.slots),
             "actions": list(self.assumptions.actions),
             "n_aspects": self.assumptions.n_aspects,
-            "trials": [asdict(trial) for trial in self.trials],
-            **({"gallery": [asdict(graph) for graph in self.gallery]} if self.gallery else {}),
+            "trials": [_named(asdict(trial), self.assumptions.alphabet) for trial in self.trials],
+            **(
+                {"gallery": [_named(asdict(graph), self.assumptions.alphabet) for graph in self.gallery]}
+                if self.gallery
+                else {}
+            ),
         }
+
+
+def _named(value: Any, alphabet: PatternAlphabet, field: str = "") -> Any:
+    """Return the fields of a page with the names of symbols in place of their numbers, where they have names."""
+    if not alphabet.names or value is None:
+        return value
+    if field in ("seen", "shown", "goal"):
+        return [None if symbol is None else alphabet.name_of(symbol) for symbol in value]
+    if field == "aspects":
+        return [list(map(alphabet.name_of, pattern)) for pattern in value]
+    if isinstance(value, dict):
+        return {name: _named(each, alphabet, name) for name, each in value.items()}
+    return [_named(each, alphabet) for each in value] if field in ("looks", "graphs") else value
 
 
 def shown_parameters(fields: Mapping[str, Any]) -> dict[str, str]:

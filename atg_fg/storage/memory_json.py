@@ -50,6 +50,19 @@ def memory_to_document(memory: RobotMemory) -> dict[str, Any]:
     return document
 
 
+def extended_memory(memory: RobotMemory, assumptions: Assumptions) -> RobotMemory:
+    """Return a memory under assumptions with more symbols; what was sampled is sampled again when it is asked for.
+
+    Raises:
+        InvalidInputError: The assumptions differ in something else.
+    """
+    document = memory_to_document(memory)
+    document["assumptions"] = write_assumptions(assumptions)
+    structure = document.get("structure", {})
+    structure.pop("evidence", None)
+    return memory_from_document(document)
+
+
 def memory_from_document(value: Any, place: str = "memory") -> RobotMemory:
     """Return the robot memory in a document; errors name ``place``.
 
@@ -100,19 +113,27 @@ def _read_merge(value: Any, assumptions: Assumptions, place: str) -> Merge:
 
 def read_assumptions(value: Any, place: str) -> Assumptions:
     """Return the assumptions at ``place``."""
-    fields = read_object(value, place, ("n_objects", "n_aspects", "actions", "slots", "n_symbols"), ("exclusive",))
+    fields = read_object(
+        value, place, ("n_objects", "n_aspects", "actions", "slots", "n_symbols"), ("exclusive", "symbols", "open")
+    )
     texts = {
         key: tuple(
             plain_text(name, f"{place}.{key}[{index}]")
-            for index, name in enumerate(read_list(fields[key], f"{place}.{key}"))
+            for index, name in enumerate(read_list(fields.get(key, []), f"{place}.{key}"))
         )
-        for key in ("actions", "slots")
+        for key in ("actions", "slots", "symbols")
     }
     numbers = {
         key: whole_number(fields[key], f"{place}.{key}", least=1) for key in ("n_objects", "n_aspects", "n_symbols")
     }
     with placed(place):
-        alphabet = PatternAlphabet(texts["slots"], numbers["n_symbols"], fields.get("exclusive", True))
+        alphabet = PatternAlphabet(
+            texts["slots"],
+            numbers["n_symbols"],
+            fields.get("exclusive", True),
+            texts["symbols"],
+            fields.get("open", False),
+        )
         return Assumptions(numbers["n_objects"], numbers["n_aspects"], texts["actions"], alphabet)
 
 
@@ -126,6 +147,8 @@ def write_assumptions(assumptions: Assumptions) -> dict[str, Any]:
         "n_symbols": assumptions.alphabet.n_symbols,
         # Left out where it is as usual: what was written before has no word of it.
         **({} if assumptions.alphabet.exclusive else {"exclusive": False}),
+        **({"symbols": list(assumptions.alphabet.names)} if assumptions.alphabet.names else {}),
+        **({"open": True} if assumptions.alphabet.is_open else {}),
     }
 
 

@@ -11,6 +11,10 @@ from atg_fg.cli.paths import IN_PLACE, parameters_of
 
 #: What each command writes to.
 OUTPUTS = {
+    "learn": {"memory", "json_file"},
+    "recognise": {"memory", "report", "json_file"},
+    "recordings check": {"json_file"},
+    "recordings convert": {"output"},
     "ablation": {"json_file", "log", "plot"},
     "bench": {"json_file", "markdown"},
     "camera calibrate": {"json_file", "output"},

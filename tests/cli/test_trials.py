@@ -97,7 +97,9 @@ def test_a_trial_takes_what_the_world_says_for_granted(run, refused, tmp_path):
     assumptions = memory_files.load_memory(memory).assumptions
     assert (assumptions.n_objects, assumptions.n_aspects, assumptions.actions[0]) == (100, 8, "open")
     assert run(*quick, "--world", "lid-box", "--memory", memory)[0] == 0
-    assert "expected 3 actions and looks of 3 slots with numbers from -1, missing, to 11" in refused(*quick, "--memory", memory)
+    assert "expected 3 actions and looks of 3 slots with numbers from -1, missing, to 11" in refused(
+        *quick, "--memory", memory
+    )
 
 
 def test_an_unknown_command_is_refused(refused):

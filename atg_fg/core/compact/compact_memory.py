@@ -152,15 +152,18 @@ class CompactMemory(RobotMemory):
         for aspect, pattern in enumerate(graph.pattern_indices):
             index.add(pattern, number, aspect)
 
-    def learn(self, patterns: Sequence[int | None], actions: Sequence[int], matched: str | None) -> str:
+    def learn(
+        self, patterns: Sequence[int | None], actions: Sequence[int], matched: str | None, name: str | None = None
+    ) -> str:
         """Learn from a trial and return the name of the ATG it went to.
 
         Args:
             patterns: Index of the pattern seen at each time, ``None`` where it was not complete, length t + 1.
             actions: Index of the action between each two, length t.
             matched: Name of the ATG to extend, or ``None`` if the object was judged novel.
+            name: Of the ATG of a novel object; the next number if not given.
         """
-        graph = AspectTransitionGraph(self._new_name(), self.assumptions) if matched is None else self[matched]
+        graph = AspectTransitionGraph(name or self._new_name(), self.assumptions) if matched is None else self[matched]
         known = graph.pattern_indices
         graph.learn(patterns, actions)
         if matched is None:
@@ -181,6 +184,14 @@ class CompactMemory(RobotMemory):
         while self._number(f"object-{number:03d}") is not None:
             number += 1
         return f"object-{number:03d}"
+
+    def rename(self, old: str, new: str) -> None:
+        """Refuse: names are in the order of the arrays.
+
+        Raises:
+            InvalidInputError: Always.
+        """
+        raise InvalidInputError(f"rename: {old!r} in a compact memory; expected JSON or a database")
 
     def merge(self, keep: str, drop: str) -> Merge:
         """Refuse: a compact memory keeps no record of merges.

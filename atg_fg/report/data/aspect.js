@@ -9,7 +9,9 @@ function face(corners, extra = "") {
 }
 
 function symbolAt(x, y, symbol) {
-  return shape("text", { class: "symbol", x, y }, symbol === null ? "?" : String(symbol));
+  const text = symbol === null ? "?" : String(symbol);
+  const fitted = text.length > 3 ? { textLength: 0.54, lengthAdjust: "spacingAndGlyphs" } : {};
+  return shape("text", { class: "symbol", x, y, ...fitted }, text);
 }
 
 // The top of a cube is sheared to the right and up; y points downwards in an SVG.

@@ -57,12 +57,12 @@ def holds_memory(connection: sqlite3.Connection) -> bool:
 
 
 def _document(connection: sqlite3.Connection, place: str) -> dict[str, Any]:
-    numbers = connection.execute("SELECT n_objects, n_aspects, n_symbols, exclusive FROM assumptions").fetchone()
+    numbers = connection.execute("SELECT n_objects, n_aspects, n_symbols, exclusive, open FROM assumptions").fetchone()
     if numbers is None:
         raise InvalidInputError(f"{place}: holds no memory, only records; expected a database with a memory")
-    actions, slots = (
+    actions, slots, symbols = (
         [name for (name,) in connection.execute(f"SELECT name FROM {table} ORDER BY number")]
-        for table in ("actions", "slots")
+        for table in ("actions", "slots", "symbols")
     )
     graphs: dict[Any, dict[str, Any]] = {}
     for number, position, name in connection.execute("SELECT id, position, name FROM graphs ORDER BY position"):
@@ -78,6 +78,8 @@ def _document(connection: sqlite3.Connection, place: str) -> dict[str, Any]:
             **({} if numbers[3] == 1 else {"exclusive": {0: False}.get(numbers[3], numbers[3])}),
             "actions": actions,
             "slots": slots,
+            **({"symbols": symbols} if symbols else {}),
+            **({"open": {1: True}.get(numbers[4], numbers[4])} if numbers[4] != 0 else {}),
         },
         "memory": list(graphs.values()),
     }

@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from atg_fg.core.aspect_graph import AspectTransitionGraph
+from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.merging import Merge
 from atg_fg.core.sense import SensedTrial
@@ -63,17 +64,19 @@ def held_by(connection: sqlite3.Connection, memory: RobotMemory) -> Held:
 def replace_memory(connection: sqlite3.Connection, memory: RobotMemory) -> Held:
     """Write a whole memory in place of what is there; records of trials stay. Inside of a transaction."""
     changed = _assumptions_differ(connection, memory)
-    tables = ("raw_trials", "structure", "merges", "transitions", "aspects", "graphs", "actions", "slots")
+    tables = ("raw_trials", "structure", "merges", "transitions", "aspects", "graphs", "actions", "slots", "symbols")
     for table in ("sensed_trials", "sense", *tables, "assumptions"):
         connection.execute(f"DELETE FROM {table}")
     assumptions = memory.assumptions
     if changed:
         connection.execute("UPDATE trials SET learned = NULL")
     alphabet = assumptions.alphabet
-    numbers = (assumptions.n_objects, assumptions.n_aspects, alphabet.n_symbols, int(alphabet.exclusive))
-    connection.execute("INSERT INTO assumptions VALUES (1, ?, ?, ?, ?)", numbers)
+    connection.execute(
+        "INSERT INTO assumptions VALUES (1, ?, ?, ?, ?, ?)", (assumptions.n_objects, *_sizes(assumptions))
+    )
     connection.executemany("INSERT INTO actions VALUES (?, ?)", enumerate(assumptions.actions))
-    connection.executemany("INSERT INTO slots VALUES (?, ?)", enumerate(assumptions.alphabet.slots))
+    connection.executemany("INSERT INTO slots VALUES (?, ?)", enumerate(alphabet.slots))
+    connection.executemany("INSERT INTO symbols VALUES (?, ?)", enumerate(alphabet.names))
     held = write_changes(connection, memory, Held())
     # No ATG of this memory has learned from what went to one that is not in it.
     names = _compact([*memory.names, *(merge.dropped.name for merge in memory.merges)])
@@ -86,14 +89,18 @@ def replace_memory(connection: sqlite3.Connection, memory: RobotMemory) -> Held:
 def _assumptions_differ(connection: sqlite3.Connection, memory: RobotMemory) -> bool:
     """Return whether the database holds a memory under other assumptions."""
     alphabet = memory.assumptions.alphabet
-    row = connection.execute("SELECT n_aspects, n_symbols, exclusive FROM assumptions").fetchone()
-    actions, slots = (
+    row = connection.execute("SELECT n_aspects, n_symbols, exclusive, open FROM assumptions").fetchone()
+    names = [
         tuple(name for (name,) in connection.execute(f"SELECT name FROM {table} ORDER BY number"))
-        for table in ("actions", "slots")
-    )
-    sizes = (memory.assumptions.n_aspects, alphabet.n_symbols, int(alphabet.exclusive))
-    new = (sizes, memory.assumptions.actions, alphabet.slots)
-    return row is not None and (row, actions, slots) != new
+        for table in ("actions", "slots", "symbols")
+    ]
+    new = [_sizes(memory.assumptions), memory.assumptions.actions, alphabet.slots, alphabet.names]
+    return row is not None and [row, *names] != new
+
+
+def _sizes(assumptions: Assumptions) -> tuple[int, ...]:
+    alphabet = assumptions.alphabet
+    return assumptions.n_aspects, alphabet.n_symbols, int(alphabet.exclusive), int(alphabet.is_open)
 
 
 def write_changes(connection: sqlite3.Connection, memory: RobotMemory, held: Held) -> Held:

@@ -73,8 +73,14 @@ _VERSION_4: Final = (
 )
 
 
+_VERSION_5: Final = (
+    "CREATE TABLE symbols (number INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE)",
+    "ALTER TABLE assumptions ADD COLUMN open INTEGER NOT NULL DEFAULT 0",
+)
+
+
 #: The statements of each step: the first makes the tables of version 1, the n-th leads from version n − 1 to n.
-MIGRATIONS: tuple[tuple[str, ...], ...] = (_VERSION_1, _VERSION_2, _VERSION_3, _VERSION_4)
+MIGRATIONS: tuple[tuple[str, ...], ...] = (_VERSION_1, _VERSION_2, _VERSION_3, _VERSION_4, _VERSION_5)
 
 
 def version_of(connection: sqlite3.Connection, place: str) -> int:

@@ -1,0 +1,353 @@
+"""``atg-fg learn``, ``recognise`` and ``recordings``: what a user's own detector saw, in CSV or JSON lines."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import closing
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from atg_fg.cli import options
+from atg_fg.cli.terminal import say
+from atg_fg.core.assumptions import Assumptions
+from atg_fg.core.errors import InvalidInputError, MissingDependencyError
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.plugins import loaded, registered
+from atg_fg.core.recordings import Recording, assumptions_for
+from atg_fg.core.table import Table
+from atg_fg.engines import engine_for
+from atg_fg.experiments import recorded_trials
+from atg_fg.experiments.scores import Score
+from atg_fg.learning.predictive_checks import summary_of_evidence
+from atg_fg.learning.structured_memory import StructuredMemory, memory_for
+from atg_fg.storage import plain_files
+from atg_fg.storage.memory_files import goes_to_database, load_memory, open_memory, save_memory
+from atg_fg.storage.memory_json import extended_memory
+from atg_fg.storage.presets import preset as preset_named
+from atg_fg.storage.recordings import (
+    RecordingSpec,
+    check_recording,
+    merged_spec,
+    read_recording,
+    read_spec,
+    write_recording,
+)
+
+RecordingFiles = Annotated[
+    list[Path], typer.Argument(help="Recordings: CSV or JSON lines, gzipped or not.", show_default=False)
+]
+Spec = Annotated[Path | None, typer.Option(help="JSON file that says what the recordings do not.")]
+Slots = Annotated[str | None, typer.Option(help="Columns that are slots, such as front,top.")]
+Actions = Annotated[str | None, typer.Option(help="All actions that there are, such as rotate,tip.")]
+Labels = Annotated[str | None, typer.Option(help="All labels that there are; another one is then refused.")]
+Objects = Annotated[int | None, typer.Option(min=1, help="|O|, the number of objects that exist.")]
+Aspects = Annotated[
+    int | None, typer.Option(min=1, help="|G|, aspects of an object; as many as patterns, up to 24, if not given.")
+]
+Exclusive = Annotated[
+    bool | None, typer.Option("--exclusive/--no-exclusive", help="Whether a label is in one slot only, as a tag is.")
+]
+MemoryPath = Annotated[
+    Path, typer.Option(help="The memory; a new one is begun if there is none.", writable=True, show_default=False)
+]
+OldMemory = Annotated[Path, typer.Option(help="The memory.", show_default=False)]
+
+app = typer.Typer(
+    help="Check recordings of your own detector, and convert them. Example: atg-fg recordings check looks.csv",
+    no_args_is_help=True,
+)
+
+
+def learn(
+    files: RecordingFiles,
+    memory: MemoryPath,
+    teach: Annotated[
+        bool, typer.Option("--teach", help="Take each trial for one of the object in its column `object`.")
+    ] = False,
+    name: Annotated[str | None, typer.Option(help="Teach all trials as this object.")] = None,
+    objects: Objects = None,
+    aspects: Aspects = None,
+    slots: Slots = None,
+    actions: Actions = None,
+    labels: Labels = None,
+    exclusive: Exclusive = None,
+    spec: Spec = None,
+    preset: options.Preset = "learned",
+    engine: options.PresetsEngine = None,
+    json_file: options.JsonFile = None,
+) -> None:
+    """Learn from recordings, trial by trial: which are of one object, how objects move, how the detector errs.
+
+    Example: atg-fg learn looks.csv --memory robot.db --objects 8
+    """
+    options.check_json_option(json_file)
+    parameters = preset_named(preset)
+    chosen = options.engine_of(engine, parameters, "bayes-filter")
+    engine_for(chosen, parameters)
+    given = _given(spec, slots, actions, labels, objects, aspects, exclusive)
+    recordings = [read_recording(file, given) for file in files]
+    if name is not None:
+        recordings = [each.taught_as(name) for each in recordings]
+    with closing(_memory_for(memory, recordings, parameters)) as kept:
+        with options.progress_bar("trials", sum(len(each.trials) for each in recordings)) as advance:
+            for each in recordings:
+                if teach or name is not None:
+                    recorded_trials.teach(each, kept, advance)
+                else:
+                    recorded_trials.recognise(each, kept, chosen, parameters, learn=True, on_trial=advance)
+        if not kept.is_kept:
+            save_memory(kept, memory)
+        document = {"command": "learn", **_learned(kept, memory)}
+    options.write_json(document, json_file)
+    if json_file != "-":
+        _tell_learned(document)
+
+
+def recognise(
+    files: RecordingFiles,
+    memory: MemoryPath,
+    learns: Annotated[
+        bool, typer.Option("--learn", help="Learn from each trial before the next; a new memory is begun if need be.")
+    ] = False,
+    objects: Objects = None,
+    aspects: Aspects = None,
+    slots: Slots = None,
+    actions: Actions = None,
+    labels: Labels = None,
+    exclusive: Exclusive = None,
+    spec: Spec = None,
+    preset: options.Preset = "learned",
+    engine: options.PresetsEngine = None,
+    report: Annotated[Path | None, typer.Option(writable=True, help="HTML page of the trials to write.")] = None,
+    json_file: options.JsonFile = None,
+) -> None:
+    """Recognise the object of each trial in recordings, with the posterior after every look.
+
+    Example: atg-fg recognise new.csv --memory robot.db --report page.html
+    """
+    options.check_json_option(json_file)
+    write_page = None
+    if report is not None:
+        plain_files.check_writable(report)
+        write_page = _page_writer()
+    parameters = preset_named(preset)
+    chosen = options.engine_of(engine, parameters, "bayes-filter")
+    engine_for(chosen, parameters)
+    given = _given(spec, slots, actions, labels, objects, aspects, exclusive)
+    recordings = [read_recording(file, given) for file in files]
+    if not learns and not memory.exists():
+        raise InvalidInputError(f"{memory}: no such file; expected a memory, or --learn to begin one")
+    with closing(_memory_for(memory, recordings, parameters, keeps=learns)) as kept:
+        presented = {trial.object for each in recordings for trial in each.trials}
+        made_from: dict[str, object] = {name: name for name in kept.names if name in presented}
+        is_known = None not in presented
+        scores = Score(made_from) if learns and is_known else None
+        found: list[recorded_trials.Recognised] = []
+        with options.progress_bar("trials", sum(len(each.trials) for each in recordings)) as advance:
+            for each in recordings:
+                found += recorded_trials.recognise(
+                    each, kept, chosen, parameters, learn=learns, scores=scores, on_trial=advance
+                )
+        if learns and not kept.is_kept:
+            save_memory(kept, memory)
+        if is_known and not learns:
+            made_from = recorded_trials.names_by_majority(found, made_from)
+            scores, found = recorded_trials.scored_afterwards(found, made_from)
+        scored = None if scores is None else recorded_trials.score_document(scores)
+        document = {
+            "command": "recognise",
+            "trials": [recorded_trials.trial_document(each) for each in found],
+            "score": scored,
+            "warnings": _warnings(kept),
+        }
+        if write_page is not None and report is not None:
+            write_page(found, kept, scored, report)
+    options.write_json(document, json_file)
+    if json_file != "-":
+        options.print_tables([_table_of(document)])
+        _tell_score(document)
+        if report is not None:
+            say(f"saved: {report}")
+
+
+@app.command()
+def check(
+    file: Annotated[Path, typer.Argument(help="A recording: CSV or JSON lines.", show_default=False)],
+    objects: Objects = None,
+    slots: Slots = None,
+    actions: Actions = None,
+    labels: Labels = None,
+    spec: Spec = None,
+    json_file: options.JsonFile = None,
+) -> None:
+    """Say what is in a recording, and what is odd: exit status 1 if it cannot be learned from as it is.
+
+    Example: atg-fg recordings check looks.csv --objects 8
+    """
+    options.check_json_option(json_file)
+    recording, faults = check_recording(file, _given(spec, slots, actions, labels, objects, None, None))
+    document = {
+        "command": "recordings check",
+        "file": str(file),
+        "slots": list(recording.slots),
+        "actions": list(recording.actions),
+        "labels": list(recording.labels),
+        "trials": len(recording.trials),
+        "looks": sum(len(trial.looks) for trial in recording.trials),
+        "objects": sorted({trial.object for trial in recording.trials if trial.object is not None}),
+        "odd": [{"kind": each.kind, "place": each.place, "what": each.what, "fatal": each.fatal} for each in faults],
+    }
+    options.write_json(document, json_file)
+    if json_file != "-":
+        objects_named = {trial.object for trial in recording.trials if trial.object is not None}
+        kinds = {"slots": recording.slots, "actions": recording.actions, "labels": recording.labels}
+        for kind, names in {**kinds, "objects": sorted(objects_named)}.items():
+            if names:
+                say(f"{kind}: {', '.join(names)}")
+        say(f"{document['trials']} trials, {document['looks']} looks")
+        for fault in faults:
+            say(f"{'fault' if fault.fatal else 'odd'}, {fault.kind}: {fault}")
+        if not faults:
+            say("nothing odd")
+    if any(fault.fatal for fault in faults):
+        raise typer.Exit(1)
+
+
+@app.command()
+def convert(
+    file: Annotated[Path, typer.Argument(help="A recording: CSV or JSON lines.", show_default=False)],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", writable=True, help=".jsonl or .csv to write.", show_default=False)
+    ],
+    objects: Objects = None,
+    aspects: Aspects = None,
+    slots: Slots = None,
+    actions: Actions = None,
+    labels: Labels = None,
+    exclusive: Exclusive = None,
+    spec: Spec = None,
+) -> None:
+    """Write a recording as JSON lines, which also hold what a table does not say, or as CSV.
+
+    Example: atg-fg recordings convert looks.csv -o looks.jsonl --objects 8
+    """
+    recording = read_recording(file, _given(spec, slots, actions, labels, objects, aspects, exclusive))
+    write_recording(recording, output)
+    say(f"saved: {output}")
+
+
+def _given(
+    spec: Path | None,
+    slots: str | None,
+    actions: str | None,
+    labels: str | None,
+    objects: int | None,
+    aspects: int | None,
+    exclusive: bool | None,
+) -> RecordingSpec:
+    """Return what options say, and else what the spec file does."""
+    said = RecordingSpec(_listed(slots), _listed(actions), _listed(labels), objects, aspects, exclusive)
+    return said if spec is None else merged_spec(said, read_spec(spec))
+
+
+def _listed(text: str | None) -> tuple[str, ...] | None:
+    return None if text is None else tuple(name.strip() for name in text.split(","))
+
+
+def _memory_for(
+    path: Path, recordings: Sequence[Recording], parameters: ModelParameters, *, keeps: bool = True
+) -> RobotMemory:
+    """Return the memory in a file, or a new one, that knows the labels of all recordings.
+
+    Args:
+        path: The file.
+        recordings: What it is to take.
+        parameters: Of the model.
+        keeps: Whether what it learns goes to the file.
+    """
+    if keeps:
+        plain_files.check_writable(path)
+    if path.exists() and not (plain_files.is_plain_file(path) and path.stat().st_size == 0):
+        held = load_memory(path)
+        assumptions = _extended(held.assumptions, recordings)
+        if assumptions != held.assumptions:
+            held = extended_memory(held, assumptions)
+            if keeps:
+                save_memory(held, path)
+        if not keeps or not goes_to_database(path):
+            return memory_for(parameters, held)
+        return memory_for(parameters, open_memory(path))
+    first = recordings[0]
+    assumptions = first.assumptions(is_open=True)
+    assumptions = _extended(assumptions, recordings)
+    if keeps and goes_to_database(path):
+        return memory_for(parameters, open_memory(path, assumptions))
+    return memory_for(parameters, RobotMemory(assumptions))
+
+
+def _extended(assumptions: Assumptions, recordings: Sequence[Recording]) -> Assumptions:
+    for each in recordings:
+        assumptions = assumptions_for(each, assumptions)
+    return assumptions
+
+
+def _page_writer() -> Any:
+    pages = registered("atg_fg.pages")
+    if "recognised" not in pages:
+        raise MissingDependencyError("--report: nothing is installed that writes pages; expected atg_fg.report")
+    return loaded("page", pages["recognised"])
+
+
+def _learned(memory: RobotMemory, path: Path) -> dict[str, Any]:
+    evidence = summary_of_evidence(memory) if isinstance(memory, StructuredMemory) else {}
+    trials = len(memory.learner.trials) if isinstance(memory, StructuredMemory) else None
+    return {
+        "memory": str(path),
+        "objects": list(memory.names),
+        "trials": trials,
+        "wrong": evidence.get("wrong"),
+        "slip": evidence.get("slip"),
+        "warnings": _warnings(memory),
+    }
+
+
+def _warnings(memory: RobotMemory) -> list[str]:
+    """Return which assumptions do not seem to hold."""
+    if isinstance(memory, StructuredMemory):
+        found = summary_of_evidence(memory).get("warnings", [])
+        if found:
+            return list(found)
+    n_objects = memory.assumptions.n_objects
+    if len(memory) <= n_objects:
+        return []
+    return [f"{len(memory)} ATGs, but n_objects is {n_objects}: there are more objects, or one has several ATGs"]
+
+
+def _tell_learned(document: dict[str, Any]) -> None:
+    say(f"{document['memory']}: {len(document['objects'])} objects")
+    if document["wrong"] is not None:
+        say(f"{document['wrong']:.1%} of labels are wrong, {document['slip']:.1%} of actions slip, by what was learned")
+    for warning in document["warnings"]:
+        say(f"warning: {warning}")
+
+
+def _tell_score(document: dict[str, Any]) -> None:
+    for name, count in (document["score"] or {}).items():
+        low, high = count["interval95"]
+        say(f"{name}: {count['count']} of {count['of']} ({100 * low:.1f}–{100 * high:.1f} %)")
+    for warning in document["warnings"]:
+        say(f"warning: {warning}")
+
+
+def _table_of(document: dict[str, Any]) -> Table:
+    rows = []
+    for trial in document["trials"]:
+        last = trial["steps"][-1]
+        matched = trial["matched"]
+        sure = last["unseen"] if matched is None else last["objects"][matched]
+        right = {True: "right", False: "wrong", None: "–"}[trial["right"]]
+        rows.append((trial["trial"], trial["verdict"], matched or "–", f"{sure:.1%}", trial["object"] or "–", right))
+    return Table("Trials", ("trial", "verdict", "matched", "probability", "in truth", ""), tuple(rows))

@@ -1,0 +1,213 @@
+"""Recordings of a user's own: their trials recognised one by one, learned from, and scored where the truth is known."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.recordings import RecordedTrial, Recording
+from atg_fg.core.records import TrialRecord, TrialStep, TrialSummary
+from atg_fg.core.statistics import wilson_interval
+from atg_fg.engines import begin_trial
+from atg_fg.experiments.scores import Score
+from atg_fg.experiments.trial import can_be_learned, learn_from, learn_steps
+
+
+class Recognised(NamedTuple):
+    """What came of one trial of a recording.
+
+    Attributes:
+        trial: Of the recording.
+        record: Look by look.
+        learned: Name of the ATG that it went to, ``None`` if nothing was learned.
+        right: Whether the verdict is right, ``None`` if the truth is not known.
+    """
+
+    trial: RecordedTrial
+    record: TrialRecord
+    learned: str | None = None
+    right: bool | None = None
+
+
+def recognise(
+    recording: Recording,
+    memory: RobotMemory,
+    engine: str,
+    parameters: ModelParameters,
+    *,
+    learn: bool = False,
+    scores: Score | None = None,
+    on_trial: Callable[[], None] | None = None,
+) -> list[Recognised]:
+    """Recognise the object of each trial in turn.
+
+    Args:
+        recording: Its labels and actions are those of the memory.
+        memory: What is remembered; it learns from each trial before the next if ``learn``.
+        engine: Name of the engine.
+        parameters: Of the model.
+        learn: See above.
+        scores: Counts what is right as it goes: verdicts are scored by what was learned until then.
+        on_trial: Called after each trial.
+
+    Raises:
+        InvalidInputError: A look that is none under the memory's assumptions; the message names trial and step.
+    """
+    found = []
+    for trial in recording.trials:
+        record = _recognised(trial, memory, engine, parameters, recording.place)
+        found.append(Recognised(trial, record, learn_from(record, memory) if learn else None))
+        if scores is not None:
+            before = scores.successes
+            scores.add(TrialSummary.of(record), found[-1].learned)
+            scores.mend(memory)
+            found[-1] = found[-1]._replace(right=scores.successes > before)
+        if on_trial is not None:
+            on_trial()
+    return found
+
+
+def teach(recording: Recording, memory: RobotMemory, on_trial: Callable[[], None] | None = None) -> int:
+    """Learn from each trial as one of the object that the recording names; return from how many there was to learn.
+
+    Raises:
+        InvalidInputError: A trial names no object.
+    """
+    taught = 0
+    for trial in recording.trials:
+        if trial.object is None:
+            raise InvalidInputError(f"{recording.place}: trial {trial.name}: no object; expected one, to be taught")
+        matched = trial.object if trial.object in memory.names else None
+        record = TrialRecord.from_looks(
+            memory.assumptions, _evidence(trial, memory, recording.place), _actions(trial, memory), trial.object
+        )
+        summary = TrialSummary.of(record)
+        if can_be_learned(summary):
+            with memory.transaction():
+                learn_steps(memory, summary, matched, None if matched else trial.object, taught=True)
+            taught += 1
+        if on_trial is not None:
+            on_trial()
+    return taught
+
+
+def _evidence(trial: RecordedTrial, memory: RobotMemory, place: str) -> list[Any]:
+    looks = []
+    for step, look in enumerate(trial.looks):
+        try:
+            looks.append(look.evidence(memory.assumptions.alphabet))
+        except InvalidInputError as error:
+            raise InvalidInputError(f"{place}: trial {trial.name}, step {step}: {error}") from error
+    return looks
+
+
+def _actions(trial: RecordedTrial, memory: RobotMemory) -> list[int]:
+    return [memory.assumptions.action_index(action) for action in trial.actions]
+
+
+def _recognised(
+    trial: RecordedTrial, memory: RobotMemory, engine: str, parameters: ModelParameters, place: str
+) -> TrialRecord:
+    inference = begin_trial(engine, memory, parameters)
+    record = TrialRecord(memory.names, memory.assumptions)
+    actions = [*_actions(trial, memory), None]
+    for evidence, action in zip(_evidence(trial, memory, place), actions, strict=True):
+        inference.observe(evidence)
+        belief = inference.conclude() if action is None else inference.identity()
+        truth: dict[str, Any] = {} if trial.object is None else {"object": trial.object}
+        if evidence.confidences:
+            truth["confidences"] = evidence.confidences
+        if evidence.slots:
+            truth["likelihoods"] = evidence.slots
+        seen = evidence.detection or (None,) * len(memory.assumptions.alphabet.slots)
+        record.steps.append(TrialStep(seen, evidence.pattern, belief, inference.log_evidence, truth, action=action))
+        if action is not None:
+            inference.act(action)
+    record.mistakes = inference.mistakes()
+    return record
+
+
+def scored_afterwards(found: Sequence[Recognised], made_from: dict[str, object]) -> tuple[Score, list[Recognised]]:
+    """Return the scores of trials that were not learned from, and the trials with what is right.
+
+    Args:
+        found: The trials.
+        made_from: The object that each ATG was made from.
+    """
+    scores, judged = Score(made_from, learns=False), []
+    for each in found:
+        before = scores.successes
+        scores.add(TrialSummary.of(each.record), None)
+        judged.append(each._replace(right=scores.successes > before))
+    return scores, judged
+
+
+def score_document(scores: Score) -> dict[str, Any]:
+    """Return how many verdicts are right as JSON knows it."""
+    counts = {
+        "success": (scores.successes, scores.n_trials),
+        "identification": (scores.identified, scores.n_trials),
+        "recognition": (scores.recognised, scores.judged_known),
+        **({} if scores.mended is None else {"mended": (scores.mended, scores.n_trials)}),
+    }
+    return {name: _count(*count) for name, count in counts.items()}
+
+
+def _count(count: int, of: int) -> dict[str, Any]:
+    low, high = wilson_interval(count, of) if of else (0.0, 1.0)
+    return {"count": count, "of": of, "rate": count / of if of else None, "interval95": [low, high]}
+
+
+def names_by_majority(found: Sequence[Recognised], made_from: dict[str, object]) -> dict[str, object]:
+    """Return the object that each ATG is taken for: the one of its name, else of most trials that were matched to it.
+
+    An ATG that was learned without being told what it is of says nothing itself of the truth.
+    """
+    votes: dict[str, Counter[object]] = {}
+    for each in found:
+        if each.record.matched is not None:
+            votes.setdefault(each.record.matched, Counter())[each.trial.object] += 1
+    return {**{name: counts.most_common(1)[0][0] for name, counts in votes.items()}, **made_from}
+
+
+def trial_document(each: Recognised) -> dict[str, Any]:
+    """Return what came of a trial as JSON knows it, with the names of labels, actions and objects."""
+    record = each.record
+    return {
+        "trial": each.trial.name,
+        "verdict": record.verdict,
+        "matched": record.matched,
+        "object": each.trial.object,
+        "right": each.right,
+        "learned": each.learned,
+        "steps": [_step_document(number, step, record) for number, step in enumerate(record.steps)],
+        "mistakes": [
+            {
+                "step": mistake.look,
+                "slot": record.assumptions.alphabet.slots[mistake.slot],
+                "probability": mistake.probability,
+            }
+            for mistake in record.mistakes
+        ],
+    }
+
+
+def _step_document(number: int, step: TrialStep, record: TrialRecord) -> dict[str, Any]:
+    alphabet = record.assumptions.alphabet
+    objects = zip(record.names, step.belief.objects.tolist(), strict=True)
+    return {
+        "step": number,
+        "seen": {
+            slot: None if symbol is None else alphabet.name_of(symbol)
+            for slot, symbol in zip(alphabet.slots, step.detection, strict=True)
+        },
+        "action": None if step.action is None else record.assumptions.actions[step.action],
+        "unseen": float(step.belief.unseen),
+        "objects": dict(objects),
+        "entropy": float(step.belief.entropy),
+        "log_evidence": float(step.log_evidence),
+    }

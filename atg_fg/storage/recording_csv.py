@@ -1,0 +1,303 @@
+"""Recordings as tables: a row a look, in CSV as spreadsheets and loggers write it.
+
+A byte order mark, any line ends, semicolons or tabs, and decimal commas beside these are read. All that is wrong is
+found, with its line and column; ``read_recording`` refuses the first fault, ``check_recording`` lists them all.
+"""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterator, Sequence
+from itertools import groupby
+from typing import Final, NamedTuple
+
+from atg_fg.core.checks import brief
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.recordings import RecordedLook, RecordedTrial
+
+#: Columns that are no slots.
+FIXED: Final = ("trial", "step", "action", "object")
+_NEEDED: Final = FIXED[:3]
+_CONFIDENCE: Final = "confidence"
+#: Characters of a field; a longer one is no label.
+_LONGEST: Final = 1000
+
+
+class Fault(NamedTuple):
+    """Something in a recording that is not as it should be.
+
+    Attributes:
+        kind: In a word or two, the same for all of its kind.
+        place: Line and column.
+        what: The value, and what was expected.
+        fatal: Whether the recording cannot be learned from as it is.
+    """
+
+    kind: str
+    place: str
+    what: str
+    fatal: bool = True
+
+    def __str__(self) -> str:
+        return f"{self.place}: {self.what}"
+
+
+class CsvColumns(NamedTuple):
+    """Which column is what.
+
+    Attributes:
+        slots: Names of the slots.
+        label: Column of each slot's label, ``None`` of a slot with weights alone.
+        confidence: Column of each slot's confidence, ``None`` without.
+        weights: (column, label) of each slot's weights.
+        fixed: Column of trial, step, action and object.
+        n_columns: Of a row.
+    """
+
+    slots: tuple[str, ...]
+    label: tuple[int | None, ...]
+    confidence: tuple[int | None, ...]
+    weights: tuple[tuple[tuple[int, str], ...], ...]
+    fixed: dict[str, int]
+    n_columns: int
+
+
+def columns_of(header: Sequence[str], slots: Sequence[str] | None = None) -> CsvColumns:
+    """Return which column is what, by the names in the first line.
+
+    ``SLOT:confidence`` is how sure the detector was of a slot's label, ``SLOT=LABEL`` the likelihood of one label.
+    Other columns than ``FIXED`` are slots. One named ``confidence`` belongs to the only other slot, if there is one.
+
+    Args:
+        header: Names.
+        slots: Those that are slots, if it is said; other columns without ``:`` and ``=`` are then left out.
+
+    Raises:
+        InvalidInputError: A column is missing or repeated, or belongs to no slot.
+    """
+    names = [name.strip() for name in header]
+    for name in names:
+        if names.count(name) > 1:
+            raise InvalidInputError(f"line 1: column {brief(name)} is repeated; expected unique columns")
+    for needed in _NEEDED:
+        if needed not in names:
+            raise InvalidInputError(
+                f"line 1: no column {needed!r} in {', '.join(names)}; expected {', '.join(_NEEDED)}"
+            )
+    plain = [name for name in names if name not in FIXED and ":" not in name and "=" not in name]
+    weighted = [name.partition("=")[0] for name in names if "=" in name]
+    lone = [name for name in plain if name != _CONFIDENCE]
+    if slots is None and _CONFIDENCE in plain and len(lone) == 1:
+        plain = lone
+    owned = list(dict.fromkeys([*plain, *weighted]) if slots is None else slots)
+    if not owned:
+        raise InvalidInputError(f"line 1: no slot in {', '.join(names)}; expected a column for what is seen")
+    for slot in owned:
+        if slot not in names and slot not in weighted:
+            raise InvalidInputError(f"line 1: no column for slot {slot!r} in {', '.join(names)}; expected one")
+    for name in names:
+        owner, colon, kind = name.partition(":")
+        if colon and "=" not in name and (kind != _CONFIDENCE or owner not in owned):
+            raise InvalidInputError(f"line 1: column {name!r}; expected SLOT:confidence of a slot: {', '.join(owned)}")
+    number = {name: index for index, name in enumerate(names)}
+    alone = number.get(_CONFIDENCE) if len(owned) == 1 and _CONFIDENCE not in owned else None
+    return CsvColumns(
+        tuple(owned),
+        tuple(number.get(slot) for slot in owned),
+        tuple(number.get(f"{slot}:{_CONFIDENCE}", alone) for slot in owned),
+        tuple(
+            tuple((index, name.partition("=")[2]) for name, index in number.items() if name.startswith(f"{slot}="))
+            for slot in owned
+        ),
+        {name: number[name] for name in FIXED if name in number},
+        len(names),
+    )
+
+
+class CsvReader:
+    """Reads the rows of a recording; all faults are collected on the way.
+
+    Args:
+        text: Of the file.
+        slots: As for ``columns_of``.
+        labels: Those that may occur, ``None`` for any.
+        actions: Those that may occur, ``None`` for any.
+
+    Attributes:
+        columns: Which is what.
+        faults: What was found to be wrong.
+    """
+
+    def __init__(
+        self,
+        text: str,
+        slots: Sequence[str] | None = None,
+        labels: Sequence[str] | None = None,
+        actions: Sequence[str] | None = None,
+    ) -> None:
+        lines = text.removeprefix("\ufeff")
+        first = lines.partition("\n")[0]
+        self._delimiter = max(",;\t", key=first.count)
+        self._rows = csv.reader(lines.split("\n"), delimiter=self._delimiter, strict=True)
+        self._labels = None if labels is None else set(labels)
+        self._actions = None if actions is None else set(actions)
+        self.faults: list[Fault] = []
+        header = next(self._rows, None)
+        if not header:
+            raise InvalidInputError("line 1: empty; expected the names of the columns")
+        self.columns = columns_of(header, slots)
+        # Looks are few and repeat: one of each kind is kept.
+        self._looks: dict[RecordedLook, RecordedLook] = {}
+
+    def trials(self) -> list[RecordedTrial]:
+        """Return the trials; where there are faults, what can be made of them."""
+        seen: set[str] = set()
+        trials = []
+        for name, rows in groupby(self._numbered(), lambda row: row[1][self.columns.fixed["trial"]].strip()):
+            kept = list(rows)
+            line = kept[0][0]
+            if not name:
+                self._fault("no trial", line, "trial", "empty; expected the name of a trial")
+            if name in seen:
+                self._fault("trial split", line, "trial", f"{brief(name)} again; expected all its rows together")
+            seen.add(name)
+            trials.append(self._trial(name, kept))
+        if not trials:
+            raise InvalidInputError("line 2: no rows; expected at least one look")
+        return trials
+
+    def _numbered(self) -> Iterator[tuple[int, list[str]]]:
+        try:
+            for row in self._rows:
+                line = self._rows.line_num
+                if not any(row):
+                    continue
+                if len(row) != self.columns.n_columns:
+                    self._fault("columns", line, "", f"{len(row)} columns; expected {self.columns.n_columns}")
+                    continue
+                yield line, row
+        except csv.Error as error:
+            raise InvalidInputError(f"line {self._rows.line_num}: {error}; expected CSV") from error
+
+    def _trial(self, name: str, rows: list[tuple[int, list[str]]]) -> RecordedTrial:
+        fixed, actions, looks = self.columns.fixed, [], []
+        for number, (line, row) in enumerate(rows):
+            self._check_step(line, row[fixed["step"]].strip(), number, rows)
+            looks.append(self._look(line, row))
+            action, last = row[fixed["action"]].strip(), number + 1 == len(rows)
+            if not last:
+                self._check_action(line, action)
+                actions.append(action)
+            elif action:
+                self._fault("action at the end", line, "action", f"{brief(action)} and no look after it", fatal=False)
+        objects = list(dict.fromkeys(row[fixed["object"]].strip() for _, row in rows)) if "object" in fixed else [""]
+        if len(objects) > 1:
+            self._fault("two objects", rows[0][0], "object", f"{brief(objects)} in a trial; expected one")
+        return RecordedTrial(name, tuple(looks), tuple(actions), objects[0] or None)
+
+    def _check_step(self, line: int, step: str, number: int, rows: list[tuple[int, list[str]]]) -> None:
+        first = rows[0][1][self.columns.fixed["step"]].strip()
+        if not (step.isascii() and step.isdigit()):
+            self._fault("no step", line, "step", f"{brief(step)}; expected a whole number")
+        elif first.isascii() and first.isdigit() and int(step) != int(first) + number:
+            kind = "missing step" if int(step) > int(first) + number else "steps out of order"
+            self._fault(kind, line, "step", f"{step}; expected {int(first) + number}, one more than before")
+
+    def _check_action(self, line: int, action: str) -> None:
+        if not action:
+            self._fault("no action", line, "action", "empty; expected what was done before the next look")
+        elif self._actions is not None and action not in self._actions:
+            known = ", ".join(sorted(self._actions))
+            self._fault("unknown action", line, "action", f"{brief(action)}; expected one of: {known}")
+
+    def _look(self, line: int, row: list[str]) -> RecordedLook:
+        columns = self.columns
+        labels, confidences, weights = [], [], []
+        for index, slot in enumerate(columns.slots):
+            at = columns.label[index]
+            label = row[at].strip() if at is not None else ""
+            labels.append(self._known(line, slot, label) if label else None)
+            confidences.append(self._confidence(line, index, row, bool(label)))
+            given = {
+                name: self._number(line, f"{slot}={name}", row[column].strip(), math.inf)
+                for column, name in columns.weights[index]
+                if row[column].strip()
+            }
+            known = {name: value for name, value in given.items() if value}
+            if known and label:
+                self._fault("label and weights", line, slot, f"{brief(label)} and likelihoods; expected one of them")
+            weights.append(known if known and not label else None)
+        if any(weights):
+            return RecordedLook(tuple(labels), tuple(confidences), tuple(weights))
+        look = RecordedLook(tuple(labels), tuple(confidences))
+        return self._looks.setdefault(look, look)
+
+    def _known(self, line: int, slot: str, label: str) -> str | None:
+        if len(label) > _LONGEST:
+            self._fault("long label", line, slot, f"{len(label)} characters; expected at most {_LONGEST}")
+            return None
+        if self._labels is not None and label not in self._labels:
+            known = ", ".join(sorted(self._labels))
+            self._fault("unknown label", line, slot, f"{brief(label)}; expected one of: {known}")
+            return None
+        return label
+
+    def _confidence(self, line: int, index: int, row: list[str], has_label: bool) -> float | None:
+        at = self.columns.confidence[index]
+        if at is None or not row[at].strip():
+            return None
+        name = f"{self.columns.slots[index]}:{_CONFIDENCE}"
+        value = self._number(line, name, row[at].strip(), 1.0)
+        if not has_label:
+            self._fault("confidence alone", line, name, f"{value} and no label; expected both or none", fatal=False)
+            return None
+        return value
+
+    def _number(self, line: int, column: str, text: str, most: float) -> float | None:
+        expected = f"expected a number from 0 to {most:g}" if math.isfinite(most) else "expected a number of at least 0"
+        try:
+            value = float(text.replace(",", ".") if self._delimiter != "," else text)
+        except ValueError:
+            value = math.nan
+        if not 0 <= value <= most or math.isinf(value):
+            self._fault("no probability", line, column, f"{brief(text)}; {expected}")
+            return None
+        return value
+
+    def _fault(self, kind: str, line: int, column: str, what: str, *, fatal: bool = True) -> None:
+        place = f"line {line}, column {column!r}" if column else f"line {line}"
+        self.faults.append(Fault(kind, place, what, fatal))
+
+
+def write_csv(slots: Sequence[str], trials: Sequence[RecordedTrial]) -> str:
+    """Return trials as CSV: with confidences and the object where there are any, with weights by label if need be."""
+    by_label = {
+        slot: sorted({name for trial in trials for look in trial.looks for name in _weights(look, index)})
+        for index, slot in enumerate(slots)
+    }
+    sure = any(value is not None for trial in trials for look in trial.looks for value in look.confidences)
+    named = any(trial.object is not None for trial in trials)
+    header = ["trial", "step", "action"]
+    for slot in slots:
+        header += [slot, *([f"{slot}:{_CONFIDENCE}"] if sure else []), *(f"{slot}={name}" for name in by_label[slot])]
+    lines = [header + (["object"] if named else [])]
+    for trial in trials:
+        for step, look in enumerate(trial.looks):
+            row = [trial.name, str(step), trial.actions[step] if step < len(trial.actions) else ""]
+            for index, slot in enumerate(slots):
+                row.append(look.labels[index] or "")
+                stated = look.confidences[index] if look.confidences else None
+                row += ["" if stated is None else repr(stated)] if sure else []
+                weights = _weights(look, index)
+                row += [repr(weights[name]) if name in weights else "" for name in by_label[slot]]
+            lines.append(row + ([trial.object or ""] if named else []))
+    return "".join(f"{','.join(map(_quoted, line))}\n" for line in lines)
+
+
+def _weights(look: RecordedLook, slot: int) -> dict[str, float]:
+    return dict(look.weights[slot] or {}) if look.weights else {}
+
+
+def _quoted(text: str) -> str:
+    return '"' + text.replace('"', '""') + '"' if set(text) & set(',;"\t\n\r') or text != text.strip() else text

@@ -1,0 +1,318 @@
+"""Recordings of a user's own detector on disk (``atg-fg/recording``): CSV, or JSON lines with a header.
+
+Both say the same. A header, or a spec file beside a CSV, says what rows do not: slots, actions, labels, the number of
+objects and of aspects, and whether slots exclude each other.
+"""
+
+from __future__ import annotations
+
+import json
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Final, NamedTuple
+
+from atg_fg.core.checks import brief, number, plain_text, whole_number
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.recordings import RecordedLook, RecordedTrial, Recording, used_labels
+from atg_fg.storage.checked_json import check_format, parse_json, read_list, read_object, without_none
+from atg_fg.storage.limits import gzip_members
+from atg_fg.storage.plain_files import GZIP, read_bytes_file, read_text_file, write_bytes_atomically
+from atg_fg.storage.recording_csv import CsvReader, Fault, write_csv
+
+RECORDING_FORMAT: Final = "atg-fg/recording"
+#: Times that an action must have been done between two whole looks to be called still.
+_COMPARED: Final = 5
+
+
+class RecordingSpec(NamedTuple):
+    """What rows alone do not say of a recording; ``None`` of what is found in them.
+
+    Attributes:
+        slots: Names of the slots.
+        actions: All that may occur.
+        labels: All that may occur.
+        n_objects: |O|.
+        n_aspects: |G|.
+        exclusive: Whether a label is in one slot only.
+    """
+
+    slots: tuple[str, ...] | None = None
+    actions: tuple[str, ...] | None = None
+    labels: tuple[str, ...] | None = None
+    n_objects: int | None = None
+    n_aspects: int | None = None
+    exclusive: bool | None = None
+
+
+_KEYS: Final = ("slots", "actions", "labels", "objects", "aspects", "exclusive")
+
+
+def read_spec(path: Path | str) -> RecordingSpec:
+    """Return what a spec file says: a JSON object with some of the keys of a header.
+
+    Raises:
+        InvalidInputError: It cannot be read, or anything in it is not as it should be.
+    """
+    return _spec(parse_json(read_text_file(path), str(path)), str(path))
+
+
+def _spec(value: Any, place: str, keys: tuple[str, ...] = ()) -> RecordingSpec:
+    fields = read_object(value, place, keys, _KEYS)
+    names = {
+        key: tuple(
+            plain_text(name, f"{place}: {key}[{index}]")
+            for index, name in enumerate(read_list(fields[key], f"{place}: {key}"))
+        )
+        for key in ("slots", "actions", "labels")
+        if key in fields
+    }
+    numbers = {
+        key: whole_number(fields[key], f"{place}: {key}", least=1) for key in ("objects", "aspects") if key in fields
+    }
+    exclusive = fields.get("exclusive")
+    if exclusive is not None and not isinstance(exclusive, bool):
+        raise InvalidInputError(f"{place}: exclusive: {brief(exclusive)}; expected true or false")
+    return RecordingSpec(
+        **names, n_objects=numbers.get("objects"), n_aspects=numbers.get("aspects"), exclusive=exclusive
+    )
+
+
+def merged_spec(*specs: RecordingSpec) -> RecordingSpec:
+    """Return what several say; of what two say the first counts."""
+    return RecordingSpec(
+        *(next((each for each in found if each is not None), None) for found in zip(*specs, strict=True))
+    )
+
+
+def read_recording(path: Path | str, spec: RecordingSpec | None = None) -> Recording:
+    """Return the recording in a file: CSV, or JSON lines; either may be gzipped.
+
+    Args:
+        path: The file.
+        spec: What it does not say itself, or says otherwise.
+
+    Raises:
+        InvalidInputError: It cannot be read, or something in it is not as it should be; the message names line, column
+            and value.
+    """
+    recording, faults = _read(path, spec or RecordingSpec())
+    fatal = next((fault for fault in faults if fault.fatal), None)
+    if fatal is not None:
+        raise InvalidInputError(f"{path}: {fatal}")
+    return recording
+
+
+def check_recording(path: Path | str, spec: RecordingSpec | None = None) -> tuple[Recording, list[Fault]]:
+    """Return what can be made of a recording, and all that is odd in it.
+
+    Raises:
+        InvalidInputError: It cannot be read at all.
+    """
+    recording, faults = _read(path, spec or RecordingSpec())
+    return recording, [*faults, *_oddities(recording)]
+
+
+def write_recording(recording: Recording, path: Path | str) -> None:
+    """Write a recording, atomically: JSON lines if the name ends in ``.jsonl``, else CSV.
+
+    Raises:
+        InvalidInputError: The file cannot be written.
+    """
+    text = _to_lines(recording) if str(path).endswith(".jsonl") else write_csv(recording.slots, recording.trials)
+    write_bytes_atomically(path, text.encode())
+
+
+def _read(path: Path | str, spec: RecordingSpec) -> tuple[Recording, list[Fault]]:
+    text = _text(path)
+    if text.lstrip("\ufeff \n").startswith("{"):
+        return _of_lines(text, str(path), spec), []
+    try:
+        reader = CsvReader(text, spec.slots, spec.labels, spec.actions)
+        trials = reader.trials()
+    except InvalidInputError as error:
+        raise InvalidInputError(f"{path}: {error}") from error
+    columns = [name for weights in reader.columns.weights for _, name in weights]
+    return _made(trials, spec._replace(slots=reader.columns.slots), columns, str(path)), reader.faults
+
+
+def _text(path: Path | str) -> str:
+    content = read_bytes_file(path)
+    if content.startswith(GZIP):
+        content = b"".join(part for part, _ in gzip_members(content, path))
+    try:
+        return content.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
+    except UnicodeError as error:
+        raise InvalidInputError(f"{path}: not UTF-8: {error}; expected a recording, CSV or JSON lines") from error
+
+
+def _made(trials: Sequence[RecordedTrial], spec: RecordingSpec, labels: Sequence[str], place: str) -> Recording:
+    """Return trials with what the spec says, and else with what occurs in them."""
+    actions = spec.actions or tuple(sorted({action for trial in trials for action in trial.actions if action}))
+    return Recording(
+        spec.slots or (),
+        actions or ("wait",),
+        spec.labels or tuple(sorted({*labels, *used_labels(trials)})) or ("nothing",),
+        tuple(trials),
+        spec.n_objects,
+        spec.n_aspects,
+        bool(spec.exclusive),
+        place,
+    )
+
+
+def _of_lines(text: str, place: str, spec: RecordingSpec) -> Recording:
+    lines = [line for line in text.removeprefix("\ufeff").split("\n") if line.strip()]
+    head = f"{place}: line 1"
+    header = parse_json(lines[0], head)
+    if not isinstance(header, dict) or "format" not in header:
+        raise InvalidInputError(f"{head}: {brief(header)}; expected a header with format {RECORDING_FORMAT!r}")
+    check_format({"version": None, **header}, RECORDING_FORMAT, head)
+    own = {name: value for name, value in header.items() if name not in ("format", "version")}
+    spec = merged_spec(spec, _spec(own, head, ("slots",)))
+    trials = [
+        _read_trial(parse_json(line, f"{place}: line {index}"), f"{place}: line {index}", spec)
+        for index, line in enumerate(lines[1:], 2)
+    ]
+    if not trials:
+        raise InvalidInputError(f"{place}: line 2: no trials; expected at least one")
+    name, times = Counter(trial.name for trial in trials).most_common(1)[0]
+    if times > 1:
+        raise InvalidInputError(f"{place}: trial {name!r} is repeated; expected unique names of trials")
+    return _made(trials, spec, (), place)
+
+
+def _read_trial(value: Any, place: str, spec: RecordingSpec) -> RecordedTrial:
+    fields = read_object(value, place, ("trial", "actions", "looks"), ("object", "confidences"))
+    slots = spec.slots or ()
+    looks = read_list(fields["looks"], f"{place}: looks")
+    actions = read_list(fields["actions"], f"{place}: actions")
+    if not looks or len(actions) != len(looks) - 1:
+        raise InvalidInputError(f"{place}: {len(looks)} looks, {len(actions)} actions; expected one look more")
+    for index, action in enumerate(actions):
+        plain_text(action, f"{place}: actions[{index}]")
+        if spec.actions is not None and action not in spec.actions:
+            raise InvalidInputError(
+                f"{place}: actions[{index}]: {brief(action)}; expected one of: {', '.join(spec.actions)}"
+            )
+    stated = read_list(fields.get("confidences", [[]] * len(looks)), f"{place}: confidences")
+    if len(stated) != len(looks):
+        raise InvalidInputError(f"{place}: confidences: {len(stated)} entries; expected {len(looks)}")
+    made = tuple(
+        _read_look(look, sure, slots, f"{place}: look {index}", spec)
+        for index, (look, sure) in enumerate(zip(looks, stated, strict=True))
+    )
+    presented = fields.get("object")
+    name = (
+        fields["trial"] if isinstance(fields["trial"], str) else str(whole_number(fields["trial"], f"{place}: trial"))
+    )
+    return RecordedTrial(
+        plain_text(name, f"{place}: trial"),
+        made,
+        tuple(actions),
+        None if presented is None else plain_text(presented, f"{place}: object"),
+    )
+
+
+def _read_look(value: Any, sure: Any, slots: tuple[str, ...], place: str, spec: RecordingSpec) -> RecordedLook:
+    entries = [None] * len(slots) if value is None else read_list(value, place)
+    stated = read_list([] if sure is None else sure, f"{place}: confidences")
+    if len(entries) != len(slots) or len(stated) not in (0, len(slots)):
+        raise InvalidInputError(
+            f"{place}: {brief(value)}, {brief(sure)}; expected an entry for each of {', '.join(slots)}"
+        )
+    labels: list[str | None] = []
+    weights: list[Mapping[str, float] | None] = []
+    for slot, entry in zip(slots, entries, strict=True):
+        where = f"{place}, slot {slot!r}"
+        given = entry if isinstance(entry, dict) else {} if entry is None else {plain_text(entry, where): 1.0}
+        for label, weight in given.items():
+            number(weight, f"{where}: {label}", 0.0)
+            if spec.labels is not None and label not in spec.labels:
+                raise InvalidInputError(f"{where}: {brief(label)}; expected one of: {', '.join(spec.labels)}")
+        if isinstance(entry, dict) and not any(given.values()):
+            raise InvalidInputError(f"{where}: {brief(entry)}; expected a likelihood above 0")
+        labels.append(entry if isinstance(entry, str) else None)
+        weights.append(given if isinstance(entry, dict) else None)
+    confidences = tuple(None if each is None else number(each, f"{place}: confidences", 0.0, 1.0) for each in stated)
+    return RecordedLook(tuple(labels), confidences, tuple(weights) if any(weights) else ())
+
+
+def _to_lines(recording: Recording) -> str:
+    header = without_none(
+        {
+            "format": RECORDING_FORMAT,
+            "version": 1,
+            "slots": list(recording.slots),
+            "actions": list(recording.actions),
+            "labels": list(recording.labels),
+            "objects": recording.n_objects,
+            "aspects": recording.n_aspects,
+            "exclusive": recording.exclusive or None,
+        }
+    )
+    return "".join(f"{json.dumps(line)}\n" for line in [header, *map(_trial_line, recording.trials)])
+
+
+def _trial_line(trial: RecordedTrial) -> dict[str, Any]:
+    looks = [
+        [
+            dict(look.weights[slot] or {}) if look.weights and look.weights[slot] else label
+            for slot, label in enumerate(look.labels)
+        ]
+        for look in trial.looks
+    ]
+    sure = any(value is not None for look in trial.looks for value in look.confidences)
+    confidences = [list(look.confidences) for look in trial.looks] if sure else None
+    return without_none(
+        {
+            "trial": trial.name,
+            "object": trial.object,
+            "actions": list(trial.actions),
+            "looks": looks,
+            "confidences": confidences,
+        }
+    )
+
+
+def _oddities(recording: Recording) -> Iterator[Fault]:
+    """Yield what no row shows by itself: what is recorded says little, or speaks against what is assumed."""
+    trials, everywhere = recording.trials, "all trials"
+    used = Counter(action for trial in trials for action in trial.actions)
+    if len(used) == 1:
+        yield _odd("one action", everywhere, f"{next(iter(used))!r} alone; expected several actions")
+    for action in recording.actions if len(recording.actions) > 1 else ():
+        if not used[action]:
+            yield _odd("unused action", everywhere, f"{action!r} is never done; expected it to occur")
+    for trial in trials:
+        if len(trial.looks) == 1:
+            yield _odd("one look", f"trial {trial.name}", "no action; expected several looks")
+        if not any(any(look.labels) or any(look.weights) for look in trial.looks):
+            yield _odd("nothing seen", f"trial {trial.name}", "nothing in any look; expected a label")
+    yield from _still_actions(recording, used)
+    soft = any(any(look.weights) for trial in trials for look in trial.looks)
+    for slot, name in enumerate(recording.slots):
+        labels = {look.labels[slot] for trial in trials for look in trial.looks} - {None}
+        if len(labels) < 2 and not soft:
+            yield _odd("one label", f"slot {name}", f"{len(labels)} labels; expected several")
+    objects = {trial.object for trial in trials if trial.object is not None}
+    if recording.n_objects is not None and len(objects) > recording.n_objects:
+        what = f"{len(objects)} objects are named; expected at most {recording.n_objects}"
+        yield _odd("more objects", "column 'object'", what)
+
+
+def _odd(kind: str, place: str, what: str) -> Fault:
+    return Fault(kind, place, what, fatal=False)
+
+
+def _still_actions(recording: Recording, used: Iterable[str]) -> Iterator[Fault]:
+    """Yield the actions after which the same is seen always: they tell nothing, or are not done."""
+    changed, compared = Counter[str](), Counter[str]()
+    for trial in recording.trials:
+        for before, action, after in zip(trial.looks, trial.actions, trial.looks[1:], strict=False):
+            if None not in before.labels and None not in after.labels:
+                compared[action] += 1
+                changed[action] += before.labels != after.labels
+    for action in used:
+        if compared[action] >= _COMPARED and not changed[action]:
+            yield _odd("still action", "all trials", f"{action!r} never changes what is seen; expected it to, at times")

@@ -1,0 +1,155 @@
+"""Recordings of a user's own on the command line: looked at, learned from, recognised, shown."""
+
+import json
+
+import numpy as np
+import pytest
+
+from atg_fg.storage.memory_files import load_memory
+
+LABELS = ("logo", "text", "barcode", "lid", "base", "seal", "plain", "window")
+
+
+def cups(trials, seed, wrong=0.0):
+    """Return trials of three boxes: rotate goes round four sides, tip to the lid and the base."""
+    rng = np.random.default_rng(seed)
+    objects = [[0, 1, 2, 1, 3, 4], [5, 5, 6, 0, 7, 2], [7, 3, 6, 6, 1, 0]]
+    rows = ["trial,step,action,label,label:confidence,object"]
+    for trial in range(trials):
+        kind, place = int(rng.integers(3)), int(rng.integers(6))
+        for step in range(7):
+            label = LABELS[int(rng.integers(8)) if rng.random() < wrong else objects[kind][place]]
+            action = ("rotate", "tip")[int(rng.integers(2))]
+            rows.append(f"t{trial},{step},{action if step < 6 else ''},{label},0.9,box-{kind}")
+            if action == "rotate":
+                place = (place + 1) % 4 if place < 4 else place
+            else:
+                place = {0: 4, 1: 4, 2: 4, 3: 4, 4: 5, 5: 0}[place]
+    return "\n".join(rows) + "\n"
+
+
+@pytest.fixture
+def folder(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "first.csv").write_text(cups(24, 1))
+    (tmp_path / "second.csv").write_text(cups(8, 2))
+    return tmp_path
+
+
+def document(run, *arguments):
+    status, output, error = run(*arguments, "--json", "-")
+    assert (status, error) == (0, "")
+    return json.loads(output)
+
+
+def test_what_was_learned_unsupervised_recognises_what_comes_next(run, folder):
+    learned = document(run, "learn", "first.csv", "--memory", "robot.db", "--objects", "3", "--aspects", "6")
+    assert learned["trials"] == 24
+    assert 2 <= len(learned["objects"]) <= 4
+    found = document(run, "recognise", "second.csv", "--memory", "robot.db", "--report", "page.html")
+    assert found["command"] == "recognise"
+    assert [trial["trial"] for trial in found["trials"]] == [f"t{number}" for number in range(8)]
+    trial = found["trials"][0]
+    assert set(trial) >= {"trial", "verdict", "matched", "object", "steps"}
+    assert trial["steps"][0]["seen"]["label"] in LABELS
+    assert len(trial["steps"]) == 7
+    assert trial["steps"][0]["action"] in ("rotate", "tip")
+    for step in trial["steps"]:
+        assert abs(step["unseen"] + sum(step["objects"].values()) - 1) < 1e-9
+    success = found["score"]["success"]
+    assert set(success) == {"count", "of", "rate", "interval95"}
+    assert success["of"] == 8
+    assert success["rate"] >= 0.7
+    assert "barcode" in (folder / "page.html").read_text()
+    assert len(load_memory(folder / "robot.db")) == len(learned["objects"])  # nothing was learned
+
+
+def test_an_empty_memory_is_begun_and_each_trial_learned_before_the_next(run, folder):
+    found = document(
+        run, "recognise", "first.csv", "--memory", "robot.json", "--learn", "--objects", "3", "--aspects", "6"
+    )
+    assert found["trials"][0]["verdict"] == "novel"
+    assert found["trials"][0]["learned"] == "object-000"
+    assert found["score"]["success"]["rate"] >= 0.7
+    assert load_memory(folder / "robot.json").names
+
+
+def test_taught_objects_have_their_names(run, folder):
+    document(run, "learn", "first.csv", "--memory", "robot.db", "--teach", "--objects", "3", "--aspects", "6")
+    memory = load_memory(folder / "robot.db")
+    assert set(memory.names) == {"box-0", "box-1", "box-2"}
+    assert memory.assumptions.alphabet.names == tuple(sorted(LABELS))
+    found = document(run, "recognise", "second.csv", "--memory", "robot.db")
+    assert found["score"]["success"]["rate"] >= 0.8
+    assert {trial["matched"] for trial in found["trials"]} <= {"box-0", "box-1", "box-2", None}
+
+
+def test_all_trials_can_be_of_one_named_object(run, folder):
+    for name in ("cup", "cup"):
+        document(
+            run, "learn", "second.csv", "--memory", "m.json", "--name", name, "--objects", "3", "--preset", "default"
+        )
+    assert load_memory(folder / "m.json").names == ("cup",)
+
+
+def test_a_label_never_met_before_is_added(run, folder):
+    document(run, "learn", "first.csv", "--memory", "robot.db", "--teach", "--objects", "3", "--preset", "default")
+    (folder / "new.csv").write_text((folder / "second.csv").read_text().replace("seal", "sticker"))
+    document(run, "recognise", "new.csv", "--memory", "robot.db")
+    assert "sticker" not in load_memory(folder / "robot.db").assumptions.alphabet.names
+    document(run, "learn", "new.csv", "--memory", "robot.db", "--teach", "--preset", "default")
+    memory = load_memory(folder / "robot.db")
+    assert memory.assumptions.alphabet.names == (*sorted(LABELS), "sticker")
+    assert len(memory) == 3
+
+
+def test_the_check_says_what_is_in_it_and_what_is_odd(run, folder):
+    status, output, error = run("recordings", "check", "first.csv")
+    assert (status, error) == (0, "")
+    assert "actions: rotate, tip" in output
+    assert "24 trials, 168 looks" in output
+    assert "nothing odd" in output
+    found = document(run, "recordings", "check", "first.csv", "--objects", "2")
+    assert [each["kind"] for each in found["odd"]] == ["more objects"]
+    (folder / "bad.csv").write_text((folder / "first.csv").read_text().replace("0.9", "9", 1))
+    status, output, error = run("recordings", "check", "bad.csv")
+    assert (status, error) == (1, "")
+    assert "fault, no probability: line 2, column 'label:confidence': '9'; expected a number from 0 to 1" in output
+
+
+def test_a_recording_is_converted_there_and_back(run, folder):
+    run("recordings", "convert", "first.csv", "-o", "first.jsonl", "--objects", "3")
+    run("recordings", "convert", "first.jsonl", "-o", "again.csv")
+    assert (folder / "again.csv").read_text() == (folder / "first.csv").read_text()
+    assert json.loads((folder / "first.jsonl").read_text().split("\n")[0])["objects"] == 3
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["learn", "first.csv", "--memory", "m.json"], "first.csv: does not say how many objects there are"),
+        (["recognise", "first.csv", "--memory", "m.json"], "m.json: no such file; expected a memory, or --learn"),
+        (["learn", "first.csv", "--memory", "m.json", "--objects", "3", "--labels", "logo"], "expected one of: logo"),
+        (
+            ["learn", "first.csv", "--memory", "m.json", "--objects", "3", "--slots", "side"],
+            "no column for slot 'side'",
+        ),
+        (["learn", "nowhere.csv", "--memory", "m.json"], "nowhere.csv: cannot be read"),
+        (["learn", "first.csv", "--memory", "first.csv", "--objects", "3"], "would be overwritten"),
+    ],
+)
+def test_what_does_not_fit_is_one_line(refused, folder, arguments, message):
+    assert message in refused(*arguments)
+    assert sorted(path.name for path in folder.iterdir()) == ["first.csv", "second.csv"]
+
+
+def test_a_memory_of_numbers_takes_no_labels(run, refused, folder):
+    run("memory", "example", "cubes.json")
+    assert "slots label; expected those of the memory: front, top" in refused(
+        "recognise", "first.csv", "--memory", "cubes.json"
+    )
+
+
+def test_more_atgs_than_objects_are_warned_of(run, folder):
+    arguments = ("learn", "first.csv", "--memory", "m.json", "--teach", "--objects", "2", "--preset", "default")
+    assert any("3 ATGs, but n_objects is 2" in warning for warning in document(run, *arguments)["warnings"])

@@ -1,0 +1,258 @@
+"""Recordings of a user's own detector: what is read, what is refused, and what is told to be odd."""
+
+import gzip
+import json
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.recordings import RecordedLook, RecordedTrial, Recording, used_labels
+from atg_fg.storage.recordings import (
+    RecordingSpec,
+    check_recording,
+    merged_spec,
+    read_recording,
+    read_spec,
+    write_recording,
+)
+
+PLAIN = """trial,step,action,label,label:confidence,object
+a,0,rotate,logo,0.9,cup
+a,1,tip,text,0.5,cup
+a,2,,,,cup
+b,0,tip,base,0.25,box
+b,1,,logo,1,box
+"""
+TRIALS = (
+    RecordedTrial(
+        "a",
+        (RecordedLook(("logo",), (0.9,)), RecordedLook(("text",), (0.5,)), RecordedLook((None,), (None,))),
+        ("rotate", "tip"),
+        "cup",
+    ),
+    RecordedTrial("b", (RecordedLook(("base",), (0.25,)), RecordedLook(("logo",), (1.0,))), ("tip",), "box"),
+)
+
+
+@pytest.fixture
+def written(tmp_path):
+    def write(text, name="looks.csv"):
+        path = tmp_path / name
+        path.write_bytes(text if isinstance(text, bytes) else text.encode())
+        return path
+
+    return write
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        PLAIN,
+        "\ufeff" + PLAIN,
+        PLAIN.replace("\n", "\r\n"),
+        PLAIN.replace("\n", "\r", 2).replace("\n", "\r\n", 2),
+        PLAIN.replace(".", ",", 3)
+        .replace(",", ";")
+        .replace("0;9", "0,9")
+        .replace("0;5", "0,5")
+        .replace("0;25", "0,25"),
+        PLAIN.replace(",", "\t"),
+        PLAIN.replace("logo", '"logo"').replace("a,1", " a , 1 "),
+        PLAIN.replace("\nb,0", "\n\nb,0"),
+        gzip.compress(PLAIN.encode()),
+    ],
+)
+def test_a_table_is_read_however_it_was_written(written, text):
+    recording = read_recording(written(text))
+    assert recording.trials == TRIALS
+    assert (recording.slots, recording.actions, recording.labels) == (
+        ("label",),
+        ("rotate", "tip"),
+        ("base", "logo", "text"),
+    )
+
+
+def test_columns_say_what_they_are(written):
+    text = "trial,step,action,front,top=a,top=b,front:confidence\n0,0,go,x,0.7,0.3,0.5\n0,1,,,,,\n"
+    recording = read_recording(written(text))
+    assert recording.slots == ("front", "top")
+    assert recording.labels == ("a", "b", "x")
+    first, second = recording.trials[0].looks
+    assert first == (("x", None), (0.5, None), (None, {"a": 0.7, "b": 0.3}))
+    assert second.labels == (None, None)
+    assert not any(second.weights)
+
+
+def test_a_column_named_confidence_is_that_of_the_only_slot(written):
+    text = "trial,step,action,label,confidence\n0,0,go,x,0.5\n0,1,,y,\n"
+    assert read_recording(written(text)).trials[0].looks[0] == (("x",), (0.5,), ())
+    two = read_recording(written(text.replace("label", "front")), RecordingSpec(slots=("front", "confidence")))
+    assert two.trials[0].looks[0].labels == ("x", "0.5")
+
+
+def test_a_spec_says_what_rows_do_not(written):
+    spec = written(json.dumps({"objects": 3, "actions": ["rotate", "tip", "flip"], "exclusive": True}), "spec.json")
+    recording = read_recording(written(PLAIN), merged_spec(RecordingSpec(n_aspects=2), read_spec(spec)))
+    assert (recording.n_objects, recording.n_aspects, recording.exclusive) == (3, 2, True)
+    assert recording.actions == ("rotate", "tip", "flip")
+    assumptions = recording.assumptions()
+    assert assumptions.alphabet.names == ("base", "logo", "text")
+    assert assumptions.alphabet.is_open
+    with pytest.raises(InvalidInputError, match=r"looks\.csv: does not say how many objects there are; expected"):
+        read_recording(written(PLAIN)).assumptions()
+
+
+labels = st.text(st.characters(exclude_categories=("Cs", "Cc", "Zl", "Zp")), min_size=1, max_size=5).map(str.strip)
+names = labels.filter(lambda text: text and not text.startswith("\ufeff"))
+
+
+@given(
+    st.lists(
+        st.tuples(st.lists(st.tuples(st.none() | names, st.none() | st.floats(0, 1)), min_size=1, max_size=4), names),
+        min_size=1,
+        max_size=3,
+    )
+)
+def test_both_faces_hold_the_same(tmp_path_factory, drawn):
+    trials = tuple(
+        RecordedTrial(
+            f"t{number}",
+            tuple(RecordedLook((label,), (sure if label else None,)) for label, sure in looks),
+            (action,) * (len(looks) - 1),
+        )
+        for number, (looks, action) in enumerate(drawn)
+    )
+    actions, seen = tuple({action for _, action in drawn}), used_labels(trials) or ["nothing"]
+    recording = Recording(("label",), actions, tuple(seen), trials)
+    folder = tmp_path_factory.mktemp("faces")
+    for name in ("looks.csv", "looks.jsonl"):
+        write_recording(recording, folder / name)
+        again = read_recording(folder / name)
+        kept = [[(look.labels, tuple(look.confidences or (None,))) for look in each.looks] for each in again.trials]
+        assert kept == [[(look.labels, look.confidences) for look in each.looks] for each in trials]
+        assert [each.actions for each in again.trials] == [each.actions for each in trials]
+
+
+def test_whole_likelihoods_go_there_and_back(tmp_path):
+    look = RecordedLook((None, "b"), (None, None), ({"a": 0.5, "b": 0.25}, None))
+    recording = Recording(("front", "top"), ("go",), ("a", "b"), (RecordedTrial("0", (look, look), ("go",), "cup"),))
+    for name in ("looks.csv", "looks.jsonl"):
+        write_recording(recording, tmp_path / name)
+        found = read_recording(tmp_path / name).trials[0]
+        assert found.object == "cup"
+        assert [dict(each.weights[0]) for each in found.looks] == [{"a": 0.5, "b": 0.25}] * 2
+        assert [each.labels for each in found.looks] == [(None, "b")] * 2
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("action,", "deed,"), "line 1: no column 'action' in trial, step, deed"),
+        (("label:confidence", "lable:confidence"), "line 1: column 'lable:confidence'; expected SLOT:confidence"),
+        (("label:confidence", "label"), "line 1: column 'label' is repeated"),
+        (("a,1,", "a,3,"), "line 3, column 'step': 3; expected 1, one more than before"),
+        (("a,1,", "a,0,"), "line 3, column 'step': 0; expected 1"),
+        (("a,1,", "a,one,"), "line 3, column 'step': 'one'; expected a whole number"),
+        (("b,0,tip,base,0.25,box\nb,1", "a,2,,,,cup\na,1"), "line 4, column 'action': empty"),
+        (("0.5", "1.5"), r"line 3, column 'label:confidence': '1.5'; expected a number from 0 to 1"),
+        (("0.5", "nan"), "line 3, column 'label:confidence': 'nan'; expected a number from 0 to 1"),
+        (("0.5", "sure"), "line 3, column 'label:confidence': 'sure'; expected a number"),
+        (("a,1,tip", "a,1,"), "line 3, column 'action': empty; expected what was done before the next look"),
+        (("0.25,box", "0.25,bag"), r"line 5, column 'object': \['bag', 'box'\] in a trial; expected one"),
+        (("a,1,tip,text", "a,1,tip,text,more"), "line 3: 7 columns; expected 6"),
+        (("a,0,rotate", ",0,rotate"), "line 2, column 'trial': empty; expected the name of a trial"),
+        (("logo", "x" * 1001), "line 2, column 'label': 1001 characters; expected at most 1000"),
+        (('a,0,rotate,logo', 'a,0,rotate,"logo'), "expected CSV"),
+    ],
+)  # fmt: skip
+def test_a_fault_is_one_line_that_says_where_and_what_was_expected(written, change, message):
+    with pytest.raises(InvalidInputError, match=message):
+        read_recording(written(PLAIN.replace(*change, 1)))
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("", "line 1: empty; expected the names of the columns"),
+        ("trial,step,action,label\n", "line 2: no rows; expected at least one look"),
+        ("trial,step,action\n0,0,\n", "line 1: no slot in trial, step, action"),
+        (b"trial,step,action,label\n0,0,,\xff\n", "not UTF-8"),
+        ("{", "line 1: not valid JSON"),
+        ('{"format": "other"}', "format: 'other'; expected 'atg-fg/recording'"),
+        ('{"format": "atg-fg/recording", "version": 1, "slots": ["a"]}', "line 2: no trials"),
+    ],
+)
+def test_what_is_no_recording_is_refused(written, text, message):
+    with pytest.raises(InvalidInputError, match=message):
+        read_recording(written(text))
+
+
+@pytest.mark.parametrize(
+    ("line", "message"),
+    [
+        ({"trial": 0, "actions": [], "looks": []}, "0 looks, 0 actions; expected one look more"),
+        ({"trial": 0, "actions": ["go"], "looks": [["x"]]}, "1 looks, 1 actions"),
+        ({"trial": 0, "actions": [], "looks": [["x", "y"]]}, "look 0: .*expected an entry for each of label"),
+        ({"trial": 0, "actions": [], "looks": [[3]]}, "look 0, slot 'label': 3; expected a text"),
+        ({"trial": 0, "actions": [], "looks": [[{"x": -1}]]}, "look 0, slot 'label': x: -1; expected"),
+        ({"trial": 0, "actions": [], "looks": [[{"x": 0}]]}, "expected a likelihood above 0"),
+        ({"trial": 0, "actions": [], "looks": [["x"]], "confidences": [[2]]}, "look 0: confidences: 2; expected"),
+        ({"trial": 0, "actions": [], "looks": [["x"]], "more": 1}, "unknown key 'more'"),
+    ],
+)
+def test_a_faulty_line_is_named(written, line, message):
+    header = {"format": "atg-fg/recording", "version": 1, "slots": ["label"]}
+    with pytest.raises(InvalidInputError, match=f"line 2.*{message}"):
+        read_recording(written(f"{json.dumps(header)}\n{json.dumps(line)}\n", "looks.jsonl"))
+
+
+ODD = "trial,step,action,label,confidence,object\n" + "".join(
+    f"{trial},{step},{'' if step == 6 else ('tip', 'rotate')[step % 2]},{'abc'[(step + trial) % 3]},0.5,o{trial}\n"
+    for trial in range(4)
+    for step in range(7)
+)
+PLANTED = {
+    "unknown label": ("0,1,rotate,b", "0,1,rotate,zebra"),
+    "unknown action": ("0,1,rotate", "0,1,kick"),
+    "missing step": ("0,1,rotate,b,0.5,o0\n", ""),
+    "steps out of order": ("0,2,tip", "0,1,tip"),
+    "no probability": ("0,1,rotate,b,0.5", "0,1,rotate,b,7"),
+    "confidence alone": ("0,1,rotate,b,0.5", "0,1,rotate,,0.5"),
+    "trial split": ("1,0,tip", "0,0,tip"),
+    "two objects": ("0,1,rotate,b,0.5,o0", "0,1,rotate,b,0.5,o9"),
+    "no action": ("0,1,rotate", "0,1,"),
+    "action at the end": ("0,6,,", "0,6,tip,"),
+    "columns": ("0,1,rotate,b,0.5,o0", "0,1,rotate,b"),
+    "more objects": ("3,6,", "3,6,"),
+}
+SPEC = RecordingSpec(labels=("a", "b", "c"), actions=("tip", "rotate"))
+
+
+@pytest.mark.parametrize("kind", PLANTED)
+def test_the_check_finds_what_was_planted(written, kind):
+    assert check_recording(written(ODD), SPEC)[1] == []
+    spec = SPEC._replace(n_objects=3) if kind == "more objects" else SPEC
+    text = ODD.replace(*PLANTED[kind], 1)
+    if kind == "trial split":  # the first row of a trial belongs to an earlier one
+        text = ODD.replace("2,0,tip", "0,0,tip", 1)
+    found = check_recording(written(text), spec)[1]
+    assert kind in {fault.kind for fault in found}, found
+
+
+@pytest.mark.parametrize(
+    ("kind", "change"),
+    [
+        ("one action", lambda line: line.replace("rotate", "tip")),
+        ("still action", lambda line: ",".join([*line.split(",")[:3], "a", "0.5", line.split(",")[5]])),
+        ("one label", lambda line: ",".join([*line.split(",")[:3], "a", "0.5", line.split(",")[5]])),
+        ("one look", lambda line: line if line.startswith(("0", "1", "2")) or line.startswith("3,0") else ""),
+        ("nothing seen", lambda line: ",".join([*line.split(",")[:3], "", "", "o3"]) if line[0] == "3" else line),
+        ("unused action", lambda line: line.replace("rotate", "tip")),
+    ],
+)
+def test_the_check_finds_what_no_row_shows_by_itself(written, kind, change):
+    header, *rows = ODD.splitlines()
+    text = "\n".join([header, *filter(None, map(change, rows))]) + "\n"
+    assert kind in {fault.kind for fault in check_recording(written(text), SPEC)[1]}
