@@ -33,7 +33,16 @@ def test_memory_1_with_structure_and_merges() -> None:
     assert memory_json.memory_to_json(memory) == (FORMATS / "memory-1-structured.json").read_text()
 
 
-@pytest.mark.parametrize("name", ["memory-1.json", "memory-1-structured.json", "memory-schema-1.db"])
+def test_memory_1_with_classes_of_appearance() -> None:
+    memory = memory_files.load_memory(FORMATS / "memory-1-sense.json")
+    assert memory.sense is not None
+    assert (memory.sense.features, len(memory.sense.trials)) == ("two", 3)
+    assert memory_json.memory_to_json(memory) == (FORMATS / "memory-1-sense.json").read_text()
+
+
+@pytest.mark.parametrize(
+    "name", ["memory-1.json", "memory-1-structured.json", "memory-1-sense.json", "memory-schema-1.db"]
+)
 def test_every_memory_goes_into_a_database_and_back(name: str, tmp_path: Path) -> None:
     memory = memory_files.load_memory(FORMATS / name)
     memory_files.save_memory(memory, tmp_path / "robot.db")

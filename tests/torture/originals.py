@@ -72,18 +72,22 @@ def originals() -> dict[str, list[bytes]]:
     """Sound files of each kind, and those of all versions that were ever written."""
     formats = _DATA / "formats"
     plain, structured = _memory(5), memory_files.load_memory(formats / "memory-1-structured.json")
+    sensed = (formats / "memory-1-sense.json").read_bytes()
     exported = export_trial(read_script(_SCRIPT.read_text()))
     with tempfile.TemporaryDirectory() as folder:
         logs = _logs(Path(folder))
     return {
-        "memory": [memory_json.memory_to_json(plain).encode(), (formats / "memory-1.json").read_bytes()],
+        "memory": [memory_json.memory_to_json(plain).encode(), (formats / "memory-1.json").read_bytes(), sensed],
         "structured memory": [(formats / "memory-1-structured.json").read_bytes()],
         "compact memory": [_compact(plain)],
         "script": [_SCRIPT.read_bytes(), _long_script()],
         "UAI model": [_UAI.encode(), write_model(exported.model).encode()],
         "UAI evidence": [b"2 0 1 2 0\n", b"1\n1 3 2\n", write_evidence(exported.evidence).encode()],
         "database": [_database(plain, n_trials=4), (formats / "memory-schema-1.db").read_bytes()],
-        "structured database": [_database(structured, n_trials=0)],
+        "structured database": [
+            _database(structured, n_trials=0),
+            _database(memory_files.load_memory(formats / "memory-1-sense.json"), n_trials=0),
+        ],
         "test log": [*logs["test log"], (formats / "test-1.jsonl.gz").read_bytes()],
         "trial record": [_trial_record()],
         "goal run": [(formats / "goal-run-1.json.gz").read_bytes()],
