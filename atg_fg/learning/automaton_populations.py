@@ -1,4 +1,4 @@
-"""Populations of chains whose structure is an automaton: one that all objects share, or one of an object's own."""
+"""Populations of chains whose structure is an automaton, shared or an object's own, and rivalry between populations."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from atg_fg.learning.populations import (
     Conclusion,
     Population,
     is_milestone,
+    log_mean,
     objects_by_label,
     votes_by_name,
 )
@@ -90,9 +91,7 @@ class AutomatonPopulation(Population):
         conclusion = self._conclude(votes, objects, AUTOMATON_TEMPERATURE)
         best = max(self.chains, key=lambda chain: chain.score)
         self.chains = [chain if chain.score > best.score - HOPELESS else best.copy() for chain in self.chains]
-        if not predictive:
-            return conclusion
-        return conclusion._replace(log_predictive=float(np.logaddexp.reduce(predictive) - np.log(len(predictive))))
+        return conclusion._replace(log_predictive=log_mean(predictive))
 
     def _own_evidence(self, task: Task) -> FloatArray:
         """Return ln p(trial | a fresh object with its own automaton), by draws that depend on the trial alone."""
@@ -141,20 +140,19 @@ class AutomatonPopulation(Population):
 
 
 class RivalPopulations(Population):
-    """Automata that all objects share, and automata of which each object may have its own, by what they foretell.
+    """Populations of different classes of structure, by what they foretell.
 
     What each population foretells of a trial before it is taken in is its evidence, trial by trial. One that is far
     behind is given up.
 
     Args:
-        sharing: The first.
-        owning: The second.
+        rivals: Two or more; saved chains know them by their number.
     """
 
-    def __init__(self, sharing: AutomatonPopulation, owning: AutomatonPopulation) -> None:
+    def __init__(self, *rivals: Population) -> None:
         super().__init__()
-        self._rivals: list[AutomatonPopulation] = [sharing, owning]
-        self._log_evidence = [0.0, 0.0]
+        self._rivals = rivals
+        self._log_evidence = [0.0] * len(rivals)
 
     def advance(self, task: Task, names: IntArray, rng: np.random.Generator) -> Conclusion:
         """Take in the last trial of a task."""
@@ -182,14 +180,13 @@ class RivalPopulations(Population):
                     gone = {id(chain) for chain in self._rivals[number].chains}
                     kept = np.array([id(chain) not in gone for chain in self.chains])
                     self.chains = [chain for chain in self.chains if id(chain) not in gone]
-                    self._rivals[number].chains = []
+                    self._rivals[number].give_up()
                     result = result._replace(weights=result.weights[kept] / result.weights[kept].sum())
         return result
 
     def log_evidence(self, task: Task) -> float:
-        """Return ln p(all trials, each of a fresh object) + ln p(automaton) of the best shared one."""
-        best = max(self._rivals, key=lambda rival: self._log_evidence[self._rivals.index(rival)])
-        return best.log_evidence(task)
+        """Return ln p(all trials, each of a fresh object) + ln p(structure) of the best rival's best structure."""
+        return self._rivals[int(np.argmax(self._log_evidence))].log_evidence(task)
 
     def saved(self, recording: Recording) -> list[SavedChain]:
         """Return the chains as they are kept, those of each rival with its evidence."""
@@ -201,7 +198,7 @@ class RivalPopulations(Population):
 
     def restore(self, saved: Sequence[SavedChain], task: Task) -> None:
         """Have the chains that were kept."""
-        self._log_evidence = [-np.inf, -np.inf]
+        self._log_evidence = [-np.inf] * len(self._rivals)
         for number, rival in enumerate(self._rivals):
             own = [each for each in saved if each.rival is not None and each.rival[0] == number]
             if own and own[0].rival is not None:

@@ -6,11 +6,12 @@ import copy
 from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from atg_fg.core.log_math import log_sum_exp
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.learning import gibbs_kernels, kernels, slip_kernels
-from atg_fg.learning.detector_noise import MOST_CERTAIN, DetectorNoise
+from atg_fg.learning import gibbs_kernels, kernels, look_kernels, slip_kernels
+from atg_fg.learning.detector_noise import MOST_CERTAIN, WRONG_PRIOR, DetectorNoise
 from atg_fg.learning.kernels import Clusters, TrialArrays
 from atg_fg.learning.number_of_objects import log_new_weights, log_partition
 from atg_fg.learning.raw_trials import Recording
@@ -68,6 +69,7 @@ class Task(NamedTuple):
         log_new: ln of the weight of a new object beside each known one, by how many are known.
         log_partition: ln of the prior of a partition, by the number of objects.
         log_own: ln p(trial | a fresh object with an automaton of its own), shape [N]; empty where none may have one.
+        right_looks: The likelihoods of looks that are not wrong as a whole, shape [N, T, J, V].
     """
 
     recording: Recording
@@ -75,20 +77,22 @@ class Task(NamedTuple):
     log_new: FloatArray
     log_partition: FloatArray
     log_own: FloatArray
+    right_looks: FloatArray = np.zeros((0, 0, 0, 0))
 
     @classmethod
     def of(cls, recording: Recording, noise: DetectorNoise, n_objects: int) -> Task:
         """Return the task of sampling with this noise, where there are at most ``n_objects``."""
         # A likelihood is taken at its word, but for what no look is ever certain of.
         soft = MOST_CERTAIN * recording.likelihoods + (1.0 - MOST_CERTAIN)
-        looks = noise.likelihoods(recording.labels, recording.confidences) * soft
+        seen = recording.labels, recording.confidences
         n_trials = len(recording.lengths)
         return cls(
             recording,
-            looks,
+            noise.likelihoods(*seen) * soft,
             log_new_weights(n_objects, n_trials, n_trials + 3),
             log_partition(n_objects, n_trials, n_trials + 3),
             np.zeros(0),
+            noise.likelihoods(*seen, of_right_looks=True) * soft,
         )
 
 
@@ -100,14 +104,27 @@ class Chain:
         log_prior: ln of its prior.
         n_symbols: V.
         may_own: Whether objects may have automata of their own.
+        judges: Whether looks may be wrong in all slots at once, and each is judged.
 
     Attributes:
         slip: ε, the probability that an action fails.
+        error: Probability that a look is wrong in all slots at once.
+        wrong: Which looks are, shape [N, T].
         score: ln of the joint probability of all that it believes and saw, averaged over its last sweeps.
     """
 
-    def __init__(self, structure: Structure, log_prior: float, n_symbols: int, *, may_own: bool = False) -> None:
-        self.may_own = may_own
+    def __init__(
+        self,
+        structure: Structure,
+        log_prior: float,
+        n_symbols: int,
+        *,
+        may_own: bool = False,
+        judges: bool = False,
+    ) -> None:
+        self.may_own, self.judges = may_own, judges
+        self.error = WRONG_PRIOR[0] / sum(WRONG_PRIOR)
+        self.wrong: NDArray[np.bool_] = np.zeros((0, 0), dtype=np.bool_)
         n_states = len(structure.registers)
         stay = np.arange(n_states)[None]
         self.structure, self.log_prior = structure, log_prior
@@ -151,6 +168,8 @@ class Chain:
             tuple((int(trial), int(time)) for trial, time in slips),
             self.slip,
             self.score,
+            wrong=tuple((int(trial), int(look)) for trial, look in np.argwhere(self.wrong)),
+            error=self.error,
         )
 
     def restore(self, saved: SavedChain, task: Task) -> None:
@@ -163,7 +182,9 @@ class Chain:
             self.clusters.successors[1 + cluster, :-1] = successors
         for trial, time in saved.slips:
             self.actions[trial, time] = self.clusters.successors.shape[1] - 1
-        self.slip, self.score = saved.slip, saved.score
+        for trial, look in saved.wrong:
+            self.wrong[trial, look] = True
+        self.slip, self.score, self.error = saved.slip, saved.score, saved.error
 
     @property
     def n_states(self) -> int:
@@ -197,9 +218,16 @@ class Chain:
         actions = recording.actions.copy()
         actions[:n_known, : self.actions.shape[1]] = self.actions
         self.actions = actions
+        wrong = np.zeros(actions.shape, dtype=np.bool_)
+        wrong[:n_known, : self.wrong.shape[1]] = self.wrong
+        self.wrong = wrong
 
     def trials(self, task: Task) -> TrialArrays:
         """Return the trials as this chain takes them to have gone."""
+        looks = np.where(self.wrong[..., None, None], 1.0, task.right_looks) if self.judges else task.looks
+        return TrialArrays(looks, self.actions, task.recording.lengths)
+
+    def _each_slot(self, task: Task) -> TrialArrays:
         return TrialArrays(task.looks, self.actions, task.recording.lengths)
 
     def scatter(self, rng: np.random.Generator) -> None:
@@ -256,9 +284,14 @@ class Chain:
 
     def _moved(self, task: Task, order: IntArray, beta: float, rng: np.random.Generator) -> Votes:
         votes = np.zeros((len(order), len(self.clusters.n_trials) + 1))
-        gibbs_kernels.sweep(
-            self.trials(task), order, self.clusters, task.log_new, self._log_own(task), beta, rng, votes
-        )
+        if self.judges:
+            looks, each_slot = task.right_looks, self._each_slot(task)
+            given = order, self.clusters, task.log_new, self.error, self.wrong, rng, votes
+            look_kernels.judged_sweep(self.trials(task), looks, each_slot, *given)
+            self._estimate_error(task)
+        else:
+            log_own = self._log_own(task)
+            gibbs_kernels.sweep(self.trials(task), order, self.clusters, task.log_new, log_own, beta, rng, votes)
         return Votes(order, votes)
 
     def slip_sweep(self, task: Task, rng: np.random.Generator, *, thorough: bool) -> FloatArray:
@@ -277,7 +310,12 @@ class Chain:
                 slip_kernels.slip_moves(trials, trial, self.clusters, done[trial], log_odds, task.log_new, 1, rng)
         votes = np.zeros(len(self.clusters.n_trials) + 1)
         last = int(order[-1])
-        slip_kernels.path_move(trials, last, self.clusters, done[last], log_odds, task.log_new, rng, votes)
+        given = last, self.clusters, done[last], log_odds, task.log_new
+        if self.judges:
+            looks, each_slot = task.right_looks, self._each_slot(task)
+            look_kernels.judged_path_move(trials, looks, each_slot, *given, self.error, self.wrong, rng, votes)
+        else:
+            slip_kernels.path_move(trials, *given, rng, votes)
         self._estimate_slip(task)
         return votes
 
@@ -290,6 +328,9 @@ class Chain:
         for automaton in self.own_automata:
             used = gibbs_kernels.entries_used(self.trials(task), self.clusters, automaton)
             total -= used * float(np.log(self.n_states))
+        if self.judges:
+            n_wrong, n_looks = int(np.count_nonzero(self.wrong)), int(task.recording.lengths.sum())
+            total += n_wrong * float(np.log(self.error)) + (n_looks - n_wrong) * float(np.log1p(-self.error))
         n_slips, n_actions = self._slips(task)
         return total + n_slips * float(np.log(self.slip)) + (n_actions - n_slips) * float(np.log1p(-self.slip))
 
@@ -398,6 +439,10 @@ class Chain:
         there = np.arange(self.actions.shape[1]) < task.recording.lengths[:, None] - 1
         stay = self.clusters.successors.shape[1] - 1
         return int(np.count_nonzero((self.actions == stay) & there)), int(np.count_nonzero(there))
+
+    def _estimate_error(self, task: Task) -> None:
+        n_wrong, n_looks = int(np.count_nonzero(self.wrong)), int(task.recording.lengths.sum())
+        self.error = (n_wrong + WRONG_PRIOR[0]) / (n_looks + sum(WRONG_PRIOR))
 
     def _estimate_slip(self, task: Task) -> None:
         n_slips, n_actions = self._slips(task)

@@ -22,6 +22,8 @@ from atg_fg.learning.saved_chain import SavedChain
 MOST_WRONG: Final = 0.3
 #: A trial is given to another object that it is of with a greater probability than this.
 MENDED: Final = 0.5
+#: Classes of structure that are rivals where there is one slot.
+MOST_RIVALS: Final = 3
 #: Chains of less weight are not followed through a trial.
 LEAST_WEIGHT: Final = 1e-3
 
@@ -259,7 +261,8 @@ class EvidenceLearner:
         n_slots = len(alphabet.slots)
         if n_slots == 1 and not alphabet.exclusive:
             sizes = (self.assumptions.n_aspects, n_slots, n_actions, alphabet.n_symbols)
-            return RivalPopulations(AutomatonPopulation(*sizes), AutomatonPopulation(*sizes, may_own=True))
+            automata = AutomatonPopulation(*sizes), AutomatonPopulation(*sizes, may_own=True)
+            return RivalPopulations(*automata, RegisterPopulation(n_slots, n_actions, alphabet.n_symbols))
         return RegisterPopulation(n_slots, n_actions, alphabet.n_symbols)
 
     def _task(self, trials: Sequence[RawTrial], noise: DetectorNoise) -> Task:

@@ -77,6 +77,10 @@ class Population(ABC):
             rng: Draws.
         """
 
+    def give_up(self) -> None:
+        """Believe nothing any more."""
+        self.chains = []
+
     @abstractmethod
     def log_evidence(self, task: Task) -> float:
         """Return ln p(all trials, each of a fresh object) + ln p(structure) of the best structure."""
@@ -94,10 +98,14 @@ class Population(ABC):
         recording = task.recording
         right = np.zeros(recording.labels.shape)
         truth = np.zeros((recording.n_symbols, recording.n_symbols))
+        sound = np.ones(recording.labels.shape)
         for chain, weight in zip(self.chains, weights.tolist(), strict=True):
             if weight > 0.01:
-                chain.tally(task, weight / weights[weights > 0.01].sum(), right, truth)
-        return noise.learned(recording.labels, recording.confidences, right, truth)
+                share = weight / weights[weights > 0.01].sum()
+                chain.tally(task, share, right, truth)
+                sound -= share * chain.wrong[..., None]
+        judged = sound if any(chain.judges for chain in self.chains) else None
+        return noise.learned(recording.labels, recording.confidences, right, truth, judged)
 
     def _conclude(self, votes: list[FloatArray], objects: list[FloatArray], temperature: float) -> Conclusion:
         scores = np.array([chain.score for chain in self.chains])
@@ -107,6 +115,11 @@ class Population(ABC):
         total = sum((weight * each for weight, each in zip(weights.tolist(), objects, strict=True)), 0.0 * objects[0])
         total /= np.maximum(total.sum(axis=1, keepdims=True), np.finfo(float).tiny)
         return Conclusion(weights @ shares, weights, total)
+
+
+def log_mean(logarithms: Sequence[float]) -> float:
+    """Return ln of the mean of numbers whose logarithms these are, 0 if there are none."""
+    return float(np.logaddexp.reduce(logarithms) - np.log(len(logarithms))) if logarithms else 0.0
 
 
 def votes_by_name(chain: Chain, votes: FloatArray, names: IntArray, task: Task) -> FloatArray:
@@ -149,14 +162,20 @@ class RegisterPopulation(Population):
 
     def advance(self, task: Task, names: IntArray, rng: np.random.Generator) -> Conclusion:
         """Take in the last trial of a task; at milestones, search for other maps."""
+        predictive = []
+        for chain in self.chains:
+            known = len(chain.clusters.owner)
+            chain.admit(task)
+            if known == len(names) - 1:
+                predictive.append(chain.log_predictive(task))
+            chain.place(task, np.arange(known, len(names)), rng)
         if is_milestone(len(names)) or not self.chains:
             self._search(task, rng)
         votes, objects = [], []
         for chain in self.chains:
-            known = len(chain.clusters.owner)
-            if known < len(names):
+            if not len(chain.clusters.owner):
                 chain.admit(task)
-                chain.place(task, np.arange(known, len(names)), rng)
+                chain.place(task, np.arange(len(names)), rng)
             own, scores = np.zeros(int(names.max(initial=-1)) + 2), []
             of_all = np.zeros((len(names), len(own) - 1 + len(names)))
             for sweep in range(MAP_SWEEPS):
@@ -174,7 +193,11 @@ class RegisterPopulation(Population):
         kept = [number for number, chain in enumerate(self.chains) if chain.score > best - HOPELESS]
         self.chains, self.maps = [self.chains[number] for number in kept], [self.maps[number] for number in kept]
         weights = conclusion.weights[kept]
-        return conclusion._replace(weights=weights / weights.sum())
+        return conclusion._replace(weights=weights / weights.sum(), log_predictive=log_mean(predictive))
+
+    def give_up(self) -> None:
+        """Believe nothing any more."""
+        self.chains, self.maps = [], []
 
     def log_evidence(self, task: Task) -> float:
         """Return ln p(all trials, each of a fresh object) + ln p(maps) of the best maps."""
@@ -191,8 +214,12 @@ class RegisterPopulation(Population):
         for each in saved:
             if each.maps is not None:
                 self.maps.append(each.maps)
-                self.chains.append(Chain(compiled_maps(each.maps), each.maps.log_prior, self._n_symbols))
+                self.chains.append(self._chain(compiled_maps(each.maps), each.maps.log_prior))
                 self.chains[-1].restore(each, task)
+
+    def _chain(self, structure: Structure, log_prior: float) -> Chain:
+        # With one slot it is all the same whether a label or its look is wrong.
+        return Chain(structure, log_prior, self._n_symbols, judges=self._n_slots > 1)
 
     def _total(self, task: Task, structure: Structure, log_prior: float) -> float:
         recording = task.recording
@@ -225,7 +252,7 @@ class RegisterPopulation(Population):
         for score, each, structure in scored[:MAX_MAPS]:
             if score > scored[0][0] - MAPS_WITHIN:
                 self.maps.append(each)
-                self.chains.append(at_hand.get(each) or Chain(structure, each.log_prior, self._n_symbols))
+                self.chains.append(at_hand.get(each) or self._chain(structure, each.log_prior))
 
 
 def compiled_maps(maps: SharedStructure) -> Structure:

@@ -19,6 +19,8 @@ class SavedChain(NamedTuple):
         slips: Pairs (trial, action) of those that failed.
         slip: ε.
         score: ln of the joint probability of all that it believes and saw.
+        wrong: Pairs (trial, look) of looks that are wrong in all slots at once.
+        error: Probability of that.
         rival: Number of its population, and the evidence of that, if there are several.
     """
 
@@ -31,3 +33,5 @@ class SavedChain(NamedTuple):
     slip: float
     score: float
     rival: tuple[int, float] | None = None
+    wrong: tuple[tuple[int, int], ...] = ()
+    error: float = 0.1

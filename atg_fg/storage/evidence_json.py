@@ -12,7 +12,7 @@ from atg_fg.core.checks import number, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import FloatArray
 from atg_fg.learning.detector_noise import MAX_BINS, DetectorNoise
-from atg_fg.learning.evidence_learner import SavedEvidence
+from atg_fg.learning.evidence_learner import MOST_RIVALS, SavedEvidence
 from atg_fg.learning.raw_trials import RawTrial
 from atg_fg.learning.saved_chain import SavedChain
 from atg_fg.learning.structured_memory import Reassignment, StructuredMemory
@@ -37,6 +37,7 @@ def write_evidence(memory: StructuredMemory) -> dict[str, Any]:
             "weights": list(saved.weights),
             "noise": {
                 "wrong": noise.wrong,
+                "alone": noise.alone,
                 "edges": noise.edges.tolist(),
                 "right": noise.right.tolist(),
                 "confusion": noise.confusion.tolist(),
@@ -67,6 +68,8 @@ def _write_chain(chain: SavedChain, assumptions: Assumptions) -> dict[str, Any]:
         "slips": [list(each) for each in chain.slips],
         "slip": chain.slip,
         "score": chain.score,
+        "wrong": [list(each) for each in chain.wrong],
+        "error": chain.error,
     }
 
 
@@ -110,7 +113,8 @@ def _read_saved(fields: dict[str, Any], memory: StructuredMemory, place: str) ->
 
 
 def _read_noise(value: Any, n_symbols: int, place: str) -> DetectorNoise:
-    fields = read_object(value, place, ("wrong", "edges", "right", "confusion"))
+    # What looks are wrong as a whole is not in files of before.
+    fields = read_object(value, place, ("wrong", "edges", "right", "confusion"), ("alone",))
     n_bins = len(read_list(fields["right"], f"{place}.right"))
     if not 1 <= n_bins <= MAX_BINS:
         raise InvalidInputError(f"{place}.right: {n_bins} bins; expected 1 to {MAX_BINS}")
@@ -122,11 +126,12 @@ def _read_noise(value: Any, n_symbols: int, place: str) -> DetectorNoise:
         _numbers(fields["right"], (n_bins,), 0.0, 1.0, f"{place}.right"),
         _numbers(fields["confusion"], (n_symbols, n_symbols), 0.0, 1.0, f"{place}.confusion"),
         number(fields["wrong"], f"{place}.wrong", 0.0, 1.0),
+        number(fields.get("alone", DetectorNoise.alone), f"{place}.alone", 1e-12, 1.0 - 1e-12),
     )
 
 
 def _read_chain(value: Any, assumptions: Assumptions, trials: Sequence[RawTrial], place: str) -> SavedChain:
-    fields = read_object(value, place, _CHAIN, ("maps", "successors", "own", "rival"))
+    fields = read_object(value, place, _CHAIN, ("maps", "successors", "own", "rival", "wrong", "error"))
     if ("maps" in fields) == ("successors" in fields):
         raise InvalidInputError(f"{place}: expected either maps or successors")
     maps, successors = None, np.zeros((0, 0), dtype=np.int64)
@@ -145,8 +150,9 @@ def _read_chain(value: Any, assumptions: Assumptions, trials: Sequence[RawTrial]
     rival = None
     if "rival" in fields:
         group, evidence = _pair(fields["rival"], f"{place}.rival")
-        rival = (whole_number(group, f"{place}.rival[0]", 0, 1), number(evidence, f"{place}.rival[1]"))
+        rival = (whole_number(group, f"{place}.rival[0]", 0, MOST_RIVALS - 1), number(evidence, f"{place}.rival[1]"))
     slips = read_list(fields["slips"], f"{place}.slips")
+    wrong = read_list(fields.get("wrong", []), f"{place}.wrong")
     return SavedChain(
         maps,
         tuple(map(tuple, successors.tolist())),
@@ -157,6 +163,8 @@ def _read_chain(value: Any, assumptions: Assumptions, trials: Sequence[RawTrial]
         number(fields["slip"], f"{place}.slip", 1e-12, 1.0 - 1e-12),
         number(fields["score"], f"{place}.score"),
         rival,
+        tuple(_read_wrong(look, trials, f"{place}.wrong[{index}]") for index, look in enumerate(wrong)),
+        number(fields.get("error", SavedChain._field_defaults["error"]), f"{place}.error", 1e-12, 1.0 - 1e-12),
     )
 
 
@@ -175,6 +183,12 @@ def _read_slip(value: Any, trials: Sequence[RawTrial], place: str) -> tuple[int,
     if not n_actions:
         raise InvalidInputError(f"{place}: trial {number_of_trial} has no action; expected one that has")
     return number_of_trial, whole_number(action, f"{place}[1]", 0, n_actions - 1)
+
+
+def _read_wrong(value: Any, trials: Sequence[RawTrial], place: str) -> tuple[int, int]:
+    trial, look = _pair(value, place)
+    number_of_trial = whole_number(trial, f"{place}[0]", 0, len(trials) - 1)
+    return number_of_trial, whole_number(look, f"{place}[1]", 0, len(trials[number_of_trial].detections) - 1)
 
 
 def _pair(value: Any, place: str) -> tuple[Any, Any]:

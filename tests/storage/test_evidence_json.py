@@ -112,7 +112,16 @@ def test_a_fault_is_told_with_its_place(learned, key):
 
 @pytest.mark.parametrize(
     ("key", "value"),
-    [("owner", [99]), ("start", [-1]), ("slips", [[0, 99]]), ("slip", 2.0), ("score", None), ("slips", [[0]])],
+    [
+        ("owner", [99]),
+        ("start", [-1]),
+        ("slips", [[0, 99]]),
+        ("slip", 2.0),
+        ("score", None),
+        ("slips", [[0]]),
+        ("wrong", [[0, 99]]),
+        ("error", 0.0),
+    ],
 )
 def test_a_fault_in_a_chain_is_told_with_its_place(learned, key, value):
     _, memory = learned
