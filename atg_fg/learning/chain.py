@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from atg_fg.core.log_math import log_sum_exp
 from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.learning import gibbs_kernels, kernels, look_kernels, slip_kernels
-from atg_fg.learning.detector_noise import MOST_CERTAIN, WRONG_PRIOR, DetectorNoise
+from atg_fg.learning.detector_noise import MOST_CERTAIN, DetectorNoise
 from atg_fg.learning.kernels import Clusters, TrialArrays
 from atg_fg.learning.number_of_objects import log_new_weights, log_partition
 from atg_fg.learning.raw_trials import Recording
@@ -20,6 +20,8 @@ from atg_fg.learning.shared_structure import SharedStructure
 
 #: Beta prior of a slip.
 SLIP_PRIOR: Final = (1.0, 99.0)
+#: Beta prior of a look that is wrong in all slots at once.
+ERROR_PRIOR: Final = (1.0, 49.0)
 #: Probability that two wrong labels of a register are the same if the structure is not the right one.
 RECURRING: Final = 0.4
 #: With more trials than this, a sweep moves only those of objects that the new one may be of, and some others.
@@ -123,7 +125,7 @@ class Chain:
         judges: bool = False,
     ) -> None:
         self.may_own, self.judges = may_own, judges
-        self.error = WRONG_PRIOR[0] / sum(WRONG_PRIOR)
+        self.error = ERROR_PRIOR[0] / sum(ERROR_PRIOR)
         self.wrong: NDArray[np.bool_] = np.zeros((0, 0), dtype=np.bool_)
         n_states = len(structure.registers)
         stay = np.arange(n_states)[None]
@@ -442,7 +444,7 @@ class Chain:
 
     def _estimate_error(self, task: Task) -> None:
         n_wrong, n_looks = int(np.count_nonzero(self.wrong)), int(task.recording.lengths.sum())
-        self.error = (n_wrong + WRONG_PRIOR[0]) / (n_looks + sum(WRONG_PRIOR))
+        self.error = (n_wrong + ERROR_PRIOR[0]) / (n_looks + sum(ERROR_PRIOR))
 
     def _estimate_slip(self, task: Task) -> None:
         n_slips, n_actions = self._slips(task)

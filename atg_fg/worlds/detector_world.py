@@ -19,9 +19,9 @@ LABELS: Final = ("logo", "text", "barcode", "plain", "lid", "base", "window", "s
 ACTIONS: Final = ("rotate", "tip")
 N_VIEWS: Final = 6
 #: Rotating turns an object that stands round to its next side, and does nothing to one that lies on a side.
-_SHARED: Final = Mechanism.deterministic([[1, 4], [2, 4], [3, 4], [0, 4], [4, 5], [5, 0]])
-_RIGHT_CONFIDENCE: Final = (0.5, 0.98)
-_WRONG_CONFIDENCE: Final = (0.35, 0.7)
+SHARED: Final = Mechanism.deterministic([[1, 4], [2, 4], [3, 4], [0, 4], [4, 5], [5, 0]])
+RIGHT_CONFIDENCE: Final = (0.5, 0.98)
+WRONG_CONFIDENCE: Final = (0.35, 0.7)
 
 
 def boxed_goods(n_objects: int, seed: int, *, own_dynamics: bool = False) -> ObjectFamily:
@@ -39,7 +39,7 @@ def boxed_goods(n_objects: int, seed: int, *, own_dynamics: bool = False) -> Obj
     for _ in range(n_objects):
         labels = rng.integers(len(LABELS), size=N_VIEWS).tolist()
         successors = rng.integers(N_VIEWS, size=(N_VIEWS, len(ACTIONS))).tolist() if own_dynamics else None
-        mechanism = _SHARED if successors is None else Mechanism.deterministic(successors)
+        mechanism = SHARED if successors is None else Mechanism.deterministic(successors)
         objects.append(FiniteObject(mechanism, tuple((label,) for label in labels)))
     return ObjectFamily(ACTIONS, PatternAlphabet(("label",), len(LABELS), exclusive=False), tuple(objects))
 
@@ -93,9 +93,9 @@ class DetectorWorld(ObjectWorld):
             return np.array([MISSING], dtype=np.int64)
         if kind < self.missing + self.wrong:
             label = (label + int(rng.integers(1, len(LABELS)))) % len(LABELS)
-            self._confidence = round(float(rng.uniform(*_WRONG_CONFIDENCE)), 2)
+            self._confidence = round(float(rng.uniform(*WRONG_CONFIDENCE)), 2)
         else:
-            self._confidence = round(float(rng.uniform(*_RIGHT_CONFIDENCE)), 2)
+            self._confidence = round(float(rng.uniform(*RIGHT_CONFIDENCE)), 2)
         return np.array([label], dtype=np.int64)
 
     def _truth(self, *, slipped: bool) -> dict[str, Any]:
