@@ -20,8 +20,8 @@ from atg_fg.learning.shared_structure import SharedStructure
 
 #: Beta prior of a slip.
 SLIP_PRIOR: Final = (1.0, 99.0)
-#: Beta prior of a look that is wrong in all slots at once.
-ERROR_PRIOR: Final = (1.0, 49.0)
+#: Beta prior of a look that is wrong in all slots at once: most detectors never do that.
+ERROR_PRIOR: Final = (0.1, 4.9)
 #: Probability that two wrong labels of a register are the same if the structure is not the right one.
 RECURRING: Final = 0.4
 #: With more trials than this, a sweep moves only those of objects that the new one may be of, and some others.

@@ -1,6 +1,6 @@
 """How many objects there are: the prior of which trials are of one object.
 
-Each trial is of one of M objects, each as probable. M is N, the number that is told, with probability 0.99, else any
+Each trial is of one of M objects, each as probable. M is N, the number that is told, with probability 0.9999, else any
 from 1 to N. So a partition of T trials into K objects has the probability
 
     Σ_M p(M) (M)_K / M^T,   (M)_K = M (M − 1) … (M − K + 1)
@@ -17,7 +17,7 @@ import numpy as np
 from atg_fg.core.patterns import FloatArray
 
 #: Probability that there are as many objects as the robot is told.
-TOLD: Final = 0.99
+TOLD: Final = 0.9999
 #: Weight that a further object keeps beside each known one when all M should be known.
 ONE_TOO_MANY: Final = 0.05
 #: Numbers of objects that are summed over; of more, some stand for all.
