@@ -11,7 +11,7 @@ from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import FloatArray
 from atg_fg.kernels import belief_kernels as kernels
-from atg_fg.kernels.memory_tables import ROOM, tables_for_trial, with_more_room
+from atg_fg.kernels.memory_tables import ROOM, arrays_for_trial, with_more_room
 
 #: Hypotheses whose terms are made at once: they stay in the processor's cache until their logarithms are taken.
 _BLOCK: Final = 1024
@@ -34,21 +34,21 @@ class CompiledFilter:
             float(parameters.transition_concentration),
             float(parameters.observation_noise),
         )
-        self._tables = tables_for_trial(memory, self._constants.concentration)
+        arrays = arrays_for_trial(memory, self._constants.concentration, self)
+        self._tables, self._aspects, self._next_aspects = arrays
         self._room = ROOM
         self._n_learned = 0
         #: p(O), shape [H]
         self.identity = prior.copy()
         self._log_identity = np.log(prior, out=np.full_like(prior, -np.inf), where=prior > 0)
-        self._aspects: FloatArray = np.zeros(self._tables.pattern.shape)
         kernels.spread_by_base(self._tables, self._constants, self._aspects)
-        self._next_aspects = np.zeros_like(self._aspects)
         self._terms: FloatArray | None = None
 
     def state(self) -> tuple[FloatArray, FloatArray]:
         """Return ln p(O | z_0:t), shape [H], and p(X_t | O, z_0:t), shape [H, W], W as of the model's tables."""
-        width = 1 + int(self._tables.n_known.max())
-        return self._log_identity, self._aspects[:, :width].copy()
+        n_known = self._tables.n_known.astype(np.int64)
+        is_there = np.arange(1 + n_known.max()) <= n_known[:, None]
+        return self._log_identity, np.where(is_there, self._aspects[:, : is_there.shape[1]], 0.0)
 
     def look(self, likelihood: FloatArray) -> float:
         """Condition on a look by its likelihood over 𝒵; return ln p(z_t | z_0:t-1), or −∞ with nothing changed."""

@@ -4,17 +4,35 @@ from __future__ import annotations
 
 import threading
 import weakref
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
 from atg_fg.core.compact.columns import positions
 from atg_fg.core.memory import RobotMemory
-from atg_fg.core.patterns import IntArray
+from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.kernels.belief_kernels import Tables, weigh
 
 #: Room that each row has for the aspects and edges that a trial finds, before rows have to be moved.
 ROOM: Final = 12
+
+
+#: Trials whose arrays are kept: one that has ended, and the one before it, as the next begins before it is gone.
+_SPARE: Final = 2
+
+
+class TrialArrays(NamedTuple):
+    """What a trial works on.
+
+    Attributes:
+        tables: What its hypotheses know.
+        aspects: Room for p(X_t | O), shape [H, W], with any content.
+        next_aspects: The same for the next time.
+    """
+
+    tables: Tables
+    aspects: FloatArray
+    next_aspects: FloatArray
 
 
 class MemoryTables:
@@ -35,30 +53,52 @@ class MemoryTables:
         largest = max(self._n_aspects, self._n_actions, len(memory.assumptions.alphabet))
         self._small = np.uint16 if largest <= np.iinfo(np.uint16).max else np.uint32
         self._concentration = concentration
-        self._lock = threading.Lock()
+        self._lock = threading.RLock()
         self._tables: Tables
         self._n_edges = 0
         self._counts: list[IntArray] = []
         self._n_known: list[int] = []
+        self._spare: list[TrialArrays] = []
         self._make(memory)
 
-    def copy_for(self, memory: RobotMemory) -> Tables:
-        """Return the tables of the memory as it is now, for a trial to extend: ``ROOM`` times, to begin with."""
+    def copy_for(self, memory: RobotMemory, trial: object) -> TrialArrays:
+        """Return the tables of the memory as it is now, for a trial to extend: ``ROOM`` times, to begin with.
+
+        Args:
+            memory: As it is now.
+            trial: Who extends them; when it is gone, the next trial gets the same arrays.
+        """
         with self._lock:
             self._bring_up_to_date(memory)
-            tables, n_rows, n_edges = self._tables, len(memory) + 1, self._n_edges + ROOM
-            edge_start = tables.edge_start[:n_rows].copy()
-            edge_start[-1] = self._n_edges
-            return Tables(
-                tables.n_known[:n_rows].copy(),
-                tables.pattern[:n_rows].copy(),
-                edge_start,
-                tables.n_edges[:n_rows].copy(),
-                tables.edges[:n_edges].copy(),
-                tables.counted[:n_edges].copy(),
-                tables.probability[:n_edges].copy(),
-                tables.prior_weight[:n_rows].copy(),
+            kept, n_rows, n_edges = self._tables, len(memory) + 1, self._n_edges + ROOM
+            lent = self._spare.pop() if self._spare else self._like_kept()
+            weakref.finalize(trial, self._take_back, lent).atexit = False
+            tables = Tables(
+                lent.tables.n_known[:n_rows],
+                lent.tables.pattern[:n_rows],
+                lent.tables.edge_start[:n_rows],
+                lent.tables.n_edges[:n_rows],
+                lent.tables.edges[:n_edges],
+                lent.tables.counted[:n_edges],
+                lent.tables.probability[:n_edges],
+                lent.tables.prior_weight[:n_rows],
             )
+            for own, array in zip(tables, kept, strict=True):
+                np.copyto(own, array[: len(own)])
+            tables.edge_start[-1] = self._n_edges
+            return TrialArrays(tables, lent.aspects[:n_rows], lent.next_aspects[:n_rows])
+
+    def _like_kept(self) -> TrialArrays:
+        n_rows, width = shape = self._tables.pattern.shape
+        tables = _empty(n_rows, len(self._tables.counted), width, self._n_actions, self._small)
+        return TrialArrays(tables, np.zeros(shape), np.zeros(shape))
+
+    def _take_back(self, lent: TrialArrays) -> None:
+        """Keep the arrays of a trial that is gone for the next: new memory costs more than copying into old."""
+        with self._lock:
+            fits = all(own.shape == kept.shape for own, kept in zip(lent.tables, self._tables, strict=True))
+            if fits and len(self._spare) < _SPARE:
+                self._spare.append(lent)
 
     def _bring_up_to_date(self, memory: RobotMemory) -> None:
         # A graph makes another count table whenever an edge is counted, and its aspects only grow.
@@ -116,6 +156,7 @@ class MemoryTables:
         width = 1 + min(max(self._n_known, default=0) + 2 * ROOM, self._n_aspects)
         self._tables = _empty(n_rows + n_rows // 2, n_edges + n_edges // 2, width, self._n_actions, self._small)
         self._n_edges = 0
+        self._spare.clear()
         for number, (graph, counts) in enumerate(zip(graphs, self._counts, strict=True)):
             self._write(number, graph.pattern_indices, counts)
         weigh(self._tables, np.arange(len(graphs)), self._concentration)
@@ -158,8 +199,14 @@ def with_more_room(tables: Tables, room: int, n_aspects: int) -> Tables:
 _kept: Final[dict[int, dict[float, MemoryTables]]] = {}
 
 
-def tables_for_trial(memory: RobotMemory, concentration: float) -> Tables:
-    """Return the tables of a memory for a trial to extend; those of the last trial are brought up to date for it."""
+def arrays_for_trial(memory: RobotMemory, concentration: float, trial: object) -> TrialArrays:
+    """Return the tables of a memory for a trial to extend; those of the last trial are brought up to date for it.
+
+    Args:
+        memory: As it is now.
+        concentration: α.
+        trial: Who extends them.
+    """
     if id(memory) not in _kept:
         _kept[id(memory)] = {}
         weakref.finalize(memory, _kept.pop, id(memory), None)
@@ -167,4 +214,4 @@ def tables_for_trial(memory: RobotMemory, concentration: float) -> Tables:
     if concentration not in kept:
         kept.clear()  # of one α at a time
         kept[concentration] = MemoryTables(memory, concentration)
-    return kept[concentration].copy_for(memory)
+    return kept[concentration].copy_for(memory, trial)
