@@ -9,7 +9,7 @@ PEERS := .venv-peers
 PEERS_READY := $(PEERS)/.ready
 
 .DEFAULT_GOAL := help
-.PHONY: help setup peers demo test test-all test-peers torture package lint format notebooks docs bench results results-engines results-robot results-goal results-evidence \
+.PHONY: help setup peers demo test test-all test-peers torture package lint format notebooks docs bench results results-pictures results-engines results-robot results-goal results-evidence \
 	results-structure example-memory tour clean
 
 help:  ## Say what there is to make
@@ -114,6 +114,13 @@ results: $(READY)  ## Run the experiments of README's results in the ideal world
 		--plot docs/images/figure3_paper.png
 	$(BIN)/atg-fg figure3 --preset default --json results/figure3_default.json --csv results/figure3_default.csv \
 		--plot docs/images/figure3_default.png
+
+# Boxes without tags; what simpler means make of them is printed.
+results-pictures: $(READY)  ## Run the experiments on boxes with pictures (about half an hour on 2 cores)
+	$(BIN)/atg-fg table1 --world picture-box --preset learned --tests 10 --json results/table1_picture-box_learned.json
+	$(BIN)/atg-fg table1 --world picture-box --preset default --engine bayes-filter --tests 10 \
+		--json results/table1_picture-box_default.json
+	$(BIN)/python benchmarks/appearance.py 10
 
 # README's table of methods, and how calibrated each engine is (about a quarter of an hour).
 results-engines: $(READY)  ## Compare and calibrate all inference engines

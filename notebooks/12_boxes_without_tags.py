@@ -182,7 +182,7 @@ gallery([wanted, *reached[-4:]], columns=5, size=(7.4, 1.4), titles=["wanted in 
 # One test of 100 trials each with preset `default`, from an empty memory. Pictures are told apart nearly as surely as
 # tags, and there are more of them; but boxes repeat plain faces, and look alike. With preset `learned`, which finds out
 # what all boxes share, boxes are recognised best: the figures of ten tests, beside nearest neighbours and other simpler
-# means, are among [all experiments](../experiments.md).
+# means, are among all experiments (docs/experiments.md).
 
 # %%
 for name in ("picture-box", "ideal"):
