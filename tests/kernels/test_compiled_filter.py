@@ -179,3 +179,18 @@ def test_a_belief_tree_does_not_learn_what_the_trial_learns_later() -> None:
         inference.act(0)
         inference.observe(Evidence.of_detection(ASSUMPTIONS.alphabet, (0, 1)))
     np.testing.assert_allclose(trees[0].expected_entropies(), expected, rtol=0, atol=1e-12)
+
+
+def test_trials_at_once_and_one_after_the_other_share_nothing() -> None:
+    memory, rng = memory_of(3), np.random.default_rng(7)
+    courses = [trial(rng, 5) for _ in range(3)]
+    for _ in range(3):  # the arrays of trials that are gone are used again
+        pairs = [both(memory) for _ in courses]
+        for time in range(5):
+            for pair, (patterns, actions) in zip(pairs, courses, strict=True):
+                evidence = Evidence.of_detection(ASSUMPTIONS.alphabet, ASSUMPTIONS.alphabet.patterns[patterns[time]])
+                for inference in pair:
+                    if time:
+                        inference.act(actions[time - 1])
+                    inference.observe(evidence)
+                assert_same(pair)
