@@ -29,7 +29,7 @@ COMMANDS: Final = {
     "Your data": {
         "learn": "atg_fg.cli.recordings:learn",
         "recognise": "atg_fg.cli.recordings:recognise",
-        "recordings": "atg_fg.cli.recordings:app",
+        "recordings": "atg_fg.cli.recording_files:app",
         "replay": "atg_fg.cli.trials:replay",
         "explain": "atg_fg.cli.explain:explain",
         "uai": "atg_fg.cli.uai:app",

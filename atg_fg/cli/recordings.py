@@ -1,4 +1,4 @@
-"""``atg-fg learn``, ``recognise`` and ``recordings``: what a user's own detector saw, in CSV or JSON lines."""
+"""``atg-fg learn`` and ``recognise``: what a user's own detector saw, in CSV or JSON lines."""
 
 from __future__ import annotations
 
@@ -29,11 +29,9 @@ from atg_fg.storage.memory_json import extended_memory
 from atg_fg.storage.presets import preset as preset_named
 from atg_fg.storage.recordings import (
     RecordingSpec,
-    check_recording,
     merged_spec,
     read_recording,
     read_spec,
-    write_recording,
 )
 
 RecordingFiles = Annotated[
@@ -54,11 +52,6 @@ MemoryPath = Annotated[
     Path, typer.Option(help="The memory; a new one is begun if there is none.", writable=True, show_default=False)
 ]
 OldMemory = Annotated[Path, typer.Option(help="The memory.", show_default=False)]
-
-app = typer.Typer(
-    help="Check recordings of your own detector, and convert them. Example: atg-fg recordings check looks.csv",
-    no_args_is_help=True,
-)
 
 
 def learn(
@@ -87,7 +80,7 @@ def learn(
     parameters = preset_named(preset)
     chosen = options.engine_of(engine, parameters, "bayes-filter")
     engine_for(chosen, parameters)
-    given = _given(spec, slots, actions, labels, objects, aspects, exclusive)
+    given = given_spec(spec, slots, actions, labels, objects, aspects, exclusive)
     recordings = [read_recording(file, given) for file in files]
     if name is not None:
         recordings = [each.taught_as(name) for each in recordings]
@@ -136,7 +129,7 @@ def recognise(
     parameters = preset_named(preset)
     chosen = options.engine_of(engine, parameters, "bayes-filter")
     engine_for(chosen, parameters)
-    given = _given(spec, slots, actions, labels, objects, aspects, exclusive)
+    given = given_spec(spec, slots, actions, labels, objects, aspects, exclusive)
     recordings = [read_recording(file, given) for file in files]
     if not learns and not memory.exists():
         raise InvalidInputError(f"{memory}: no such file; expected a memory, or --learn to begin one")
@@ -173,73 +166,7 @@ def recognise(
             say(f"saved: {report}")
 
 
-@app.command()
-def check(
-    file: Annotated[Path, typer.Argument(help="A recording: CSV or JSON lines.", show_default=False)],
-    objects: Objects = None,
-    slots: Slots = None,
-    actions: Actions = None,
-    labels: Labels = None,
-    spec: Spec = None,
-    json_file: options.JsonFile = None,
-) -> None:
-    """Say what is in a recording, and what is odd: exit status 1 if it cannot be learned from as it is.
-
-    Example: atg-fg recordings check looks.csv --objects 8
-    """
-    options.check_json_option(json_file)
-    recording, faults = check_recording(file, _given(spec, slots, actions, labels, objects, None, None))
-    document = {
-        "command": "recordings check",
-        "file": str(file),
-        "slots": list(recording.slots),
-        "actions": list(recording.actions),
-        "labels": list(recording.labels),
-        "trials": len(recording.trials),
-        "looks": sum(len(trial.looks) for trial in recording.trials),
-        "objects": sorted({trial.object for trial in recording.trials if trial.object is not None}),
-        "odd": [{"kind": each.kind, "place": each.place, "what": each.what, "fatal": each.fatal} for each in faults],
-    }
-    options.write_json(document, json_file)
-    if json_file != "-":
-        objects_named = {trial.object for trial in recording.trials if trial.object is not None}
-        kinds = {"slots": recording.slots, "actions": recording.actions, "labels": recording.labels}
-        for kind, names in {**kinds, "objects": sorted(objects_named)}.items():
-            if names:
-                say(f"{kind}: {', '.join(names)}")
-        say(f"{document['trials']} trials, {document['looks']} looks")
-        for fault in faults:
-            say(f"{'fault' if fault.fatal else 'odd'}, {fault.kind}: {fault}")
-        if not faults:
-            say("nothing odd")
-    if any(fault.fatal for fault in faults):
-        raise typer.Exit(1)
-
-
-@app.command()
-def convert(
-    file: Annotated[Path, typer.Argument(help="A recording: CSV or JSON lines.", show_default=False)],
-    output: Annotated[
-        Path, typer.Option("--output", "-o", writable=True, help=".jsonl or .csv to write.", show_default=False)
-    ],
-    objects: Objects = None,
-    aspects: Aspects = None,
-    slots: Slots = None,
-    actions: Actions = None,
-    labels: Labels = None,
-    exclusive: Exclusive = None,
-    spec: Spec = None,
-) -> None:
-    """Write a recording as JSON lines, which also hold what a table does not say, or as CSV.
-
-    Example: atg-fg recordings convert looks.csv -o looks.jsonl --objects 8
-    """
-    recording = read_recording(file, _given(spec, slots, actions, labels, objects, aspects, exclusive))
-    write_recording(recording, output)
-    say(f"saved: {output}")
-
-
-def _given(
+def given_spec(
     spec: Path | None,
     slots: str | None,
     actions: str | None,

@@ -113,6 +113,24 @@ def check_recording(path: Path | str, spec: RecordingSpec | None = None) -> tupl
     return recording, [*faults, *_oddities(recording)]
 
 
+def completed(recording: Recording, spec: RecordingSpec) -> Recording:
+    """Return a recording with what a spec says of it besides.
+
+    Raises:
+        InvalidInputError: It has other slots, or labels or actions that the spec does not know.
+    """
+    if spec.slots not in (None, recording.slots):
+        raise InvalidInputError(f"{recording.place}: slots {', '.join(recording.slots)}; expected {spec.slots}")
+    for kind, found, known in (
+        ("label", recording.labels, spec.labels),
+        ("action", recording.actions, spec.actions),
+    ):
+        for name in found:
+            if known is not None and name not in known:
+                raise InvalidInputError(f"{recording.place}: {kind} {name!r}; expected one of: {', '.join(known)}")
+    return _made(recording.trials, spec._replace(slots=recording.slots), recording.labels, recording.place)
+
+
 def write_recording(recording: Recording, path: Path | str) -> None:
     """Write a recording, atomically: JSON lines if the name ends in ``.jsonl``, else CSV.
 

@@ -41,7 +41,7 @@ def boxed_goods(n_objects: int, seed: int, *, own_dynamics: bool = False) -> Obj
         successors = rng.integers(N_VIEWS, size=(N_VIEWS, len(ACTIONS))).tolist() if own_dynamics else None
         mechanism = SHARED if successors is None else Mechanism.deterministic(successors)
         objects.append(FiniteObject(mechanism, tuple((label,) for label in labels)))
-    return ObjectFamily(ACTIONS, PatternAlphabet(("label",), len(LABELS), exclusive=False), tuple(objects))
+    return ObjectFamily(ACTIONS, PatternAlphabet.named(("label",), LABELS, exclusive=False), tuple(objects))
 
 
 class DetectorWorld(ObjectWorld):

@@ -1,0 +1,124 @@
+"""``atg-fg recordings``: recordings of a user's own detector checked, converted and simulated."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from atg_fg.cli import options
+from atg_fg.cli.recordings import Actions, Aspects, Exclusive, Labels, Objects, Slots, Spec, given_spec
+from atg_fg.cli.terminal import say
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.experiments.simulated_recording import simulated_recording
+from atg_fg.storage import plain_files
+from atg_fg.storage.recordings import check_recording, completed, read_recording, write_recording
+from atg_fg.storage.rosbag_recordings import is_bag, read_bag, read_topics
+
+app = typer.Typer(
+    help="Check recordings of your own detector, and convert them. Example: atg-fg recordings check looks.csv",
+    no_args_is_help=True,
+)
+
+
+@app.command()
+def check(
+    file: Annotated[Path, typer.Argument(help="A recording: CSV or JSON lines.", show_default=False)],
+    objects: Objects = None,
+    slots: Slots = None,
+    actions: Actions = None,
+    labels: Labels = None,
+    spec: Spec = None,
+    json_file: options.JsonFile = None,
+) -> None:
+    """Say what is in a recording, and what is odd: exit status 1 if it cannot be learned from as it is.
+
+    Example: atg-fg recordings check looks.csv --objects 8
+    """
+    options.check_json_option(json_file)
+    recording, faults = check_recording(file, given_spec(spec, slots, actions, labels, objects, None, None))
+    document = {
+        "command": "recordings check",
+        "file": str(file),
+        "slots": list(recording.slots),
+        "actions": list(recording.actions),
+        "labels": list(recording.labels),
+        "trials": len(recording.trials),
+        "looks": sum(len(trial.looks) for trial in recording.trials),
+        "objects": sorted({trial.object for trial in recording.trials if trial.object is not None}),
+        "odd": [{"kind": each.kind, "place": each.place, "what": each.what, "fatal": each.fatal} for each in faults],
+    }
+    options.write_json(document, json_file)
+    if json_file != "-":
+        objects_named = {trial.object for trial in recording.trials if trial.object is not None}
+        kinds = {"slots": recording.slots, "actions": recording.actions, "labels": recording.labels}
+        for kind, names in {**kinds, "objects": sorted(objects_named)}.items():
+            if names:
+                say(f"{kind}: {', '.join(names)}")
+        say(f"{document['trials']} trials, {document['looks']} looks")
+        for fault in faults:
+            say(f"{'fault' if fault.fatal else 'odd'}, {fault.kind}: {fault}")
+        if not faults:
+            say("nothing odd")
+    if any(fault.fatal for fault in faults):
+        raise typer.Exit(1)
+
+
+@app.command()
+def convert(
+    file: Annotated[Path, typer.Argument(help="A recording, CSV or JSON lines; or a bag of ROS.", show_default=False)],
+    output: Annotated[
+        Path, typer.Option("--output", "-o", writable=True, help=".jsonl or .csv to write.", show_default=False)
+    ],
+    topics: Annotated[
+        Path | None, typer.Option(help="JSON file that says in which topics of a bag labels and actions are.")
+    ] = None,
+    objects: Objects = None,
+    aspects: Aspects = None,
+    slots: Slots = None,
+    actions: Actions = None,
+    labels: Labels = None,
+    exclusive: Exclusive = None,
+    spec: Spec = None,
+) -> None:
+    """Write a recording as JSON lines, which also hold what a table does not say, or as CSV.
+
+    A bag of ROS 2 (rosbag2, MCAP) or ROS 1 is read with `--topics`. (Extra `ros`.)
+
+    Example: atg-fg recordings convert looks.csv -o looks.jsonl --objects 8
+    """
+    given = given_spec(spec, slots, actions, labels, objects, aspects, exclusive)
+    if topics is not None:
+        recording = completed(read_bag(file, read_topics(topics)), given)
+    elif is_bag(file):
+        raise InvalidInputError(f"{file}: a bag; expected --topics FILE, which says where labels and actions are")
+    else:
+        recording = read_recording(file, given)
+    write_recording(recording, output)
+    say(f"saved: {output}")
+
+
+@app.command()
+def simulate(
+    output: Annotated[
+        Path, typer.Option("--output", "-o", writable=True, help=".jsonl or .csv to write.", show_default=False)
+    ],
+    world: options.World = "detector",
+    objects: Annotated[int, typer.Option(min=1, help="|O|, the number of objects that exist.")] = 8,
+    trials: Annotated[int, typer.Option(min=1, help="Number of trials.")] = 48,
+    actions: options.Actions = 8,
+    slip: options.Slip = 0.0,
+    wrong: options.Wrong = 0.0,
+    missing: options.Missing = 0.0,
+    world_option: options.WorldOption = None,
+    seed: Annotated[int, typer.Option(min=0, help="Seed of objects, trials and actions.")] = 0,
+) -> None:
+    """Record trials in a world, acted on at random: a recording with the truth in its column `object`.
+
+    Example: atg-fg recordings simulate -o looks.csv --wrong 0.2 --missing 0.1 --world-option confidences=true
+    """
+    plain_files.check_writable(output)
+    own = options.world_options(slip, wrong, missing, own=world_option)
+    write_recording(simulated_recording(world, objects, trials, actions, seed, **own), output)
+    say(f"saved: {output}")
