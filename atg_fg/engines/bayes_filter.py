@@ -27,10 +27,12 @@ class BayesFilter(FilterInference):
     name: ClassVar[str] = "bayes-filter"
     exact: ClassVar[bool] = True
 
+    #: Whether loops are compiled; not for those that ask for the model's tables at each look.
+    _compiles: ClassVar[bool] = True
     _compiled: CompiledFilter | None = None
 
     def _tables(self) -> RecognitionModel:
-        if not compilation.are_wanted():
+        if not (self._compiles and compilation.are_wanted()):
             return super()._tables()
         return TablesOnDemand(self.memory, self.parameters, self.prior, graphs=list(self.memory))
 

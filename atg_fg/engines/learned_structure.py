@@ -48,6 +48,7 @@ class LearnedStructure(BayesFilter):
 
     name: ClassVar[str] = "learned-structure"
     exact: ClassVar[bool] = False
+    _compiles: ClassVar[bool] = False
     knows_structure: ClassVar[bool] = True
 
     def __init__(self, setup: TrialSetup) -> None:
