@@ -144,7 +144,7 @@ results-robot: $(READY)  ## Run the experiments on the simulated robot (about an
 	done
 	$(BIN)/atg-fg sim calibrate results/reliability_worn.json --output atg_fg/storage/data/robot.json
 	for preset in default robot; do \
-		$(BIN)/atg-fg table1 --slip 0.038 --missing 0.032 --preset $$preset --tests 20 --engine bayes-filter \
+		$(BIN)/atg-fg table1 --slip 0.038 --missing 0.047 --preset $$preset --tests 20 --engine bayes-filter \
 			--json results/table1_noisy_$$preset.json || exit; \
 	done
 	$(BIN)/atg-fg sim picture --output docs/images/robonaut.png --film docs/images/robonaut.gif \

@@ -177,8 +177,7 @@ class PoseFilter:
         right = np.flatnonzero(truth > SAME)
         source, tables = kept[right], self._contents[self.rows.table[right]]
         joint = joint[source] / probability[source, None]
-        one_hot = [symbols[:, slot, None] == np.arange(self._alphabet.n_symbols) for slot in range(len(shown))]
-        posteriors = [joint @ each.astype(np.float64) for each in one_hot]
+        posteriors = self._of_slots(joint)
         index = np.arange(len(right))
         for slot, posterior in enumerate(posteriors):
             register, expected = registers[source, slot], shown[slot][source]
@@ -331,10 +330,24 @@ class PoseFilter:
         combined = shown[0]
         for probabilities in shown[1:]:
             combined = (combined[:, :, None] * probabilities[:, None, :]).reshape(len(combined), -1)
-        by_owner = np.add.reduceat(combined, first)
-        places = np.ravel_multi_index(tuple(symbols.T), (self._alphabet.n_symbols,) * symbols.shape[1])
-        patterns: FloatArray = by_owner[:, places]
+        patterns: FloatArray = np.add.reduceat(combined, first)[:, self._places()]
         return patterns
+
+    def _of_slots(self, joint: FloatArray) -> list[FloatArray]:
+        """Return the marginal of each slot, shape [J, n_symbols], of a joint of all patterns, shape [J, |𝒵|]."""
+        n_slots, shape = self._alphabet.symbols.shape[1], (self._alphabet.n_symbols,)
+        grid = np.zeros((len(joint), self._alphabet.n_symbols**n_slots))
+        grid[:, self._places()] = joint
+        grid = grid.reshape(len(joint), *shape * n_slots)
+        return [
+            grid.sum(axis=tuple(other + 1 for other in range(n_slots) if other != slot)) for slot in range(n_slots)
+        ]
+
+    def _places(self) -> IntArray:
+        """Return where each pattern is among all combinations of symbols, shape [|𝒵|]."""
+        symbols = self._alphabet.symbols
+        places: IntArray = np.ravel_multi_index(tuple(symbols.T), (self._alphabet.n_symbols,) * symbols.shape[1])
+        return places
 
 
 def _runs(values: IntArray) -> tuple[IntArray, IntArray]:

@@ -70,6 +70,11 @@ def translated(place: Path | str) -> Iterator[None]:
                 f"{place}: damaged: to read it takes more work than its size explains, so it was ended"
             ) from error
         raise InvalidInputError(f"{place}: damaged, or not a memory of atg-fg: {error}") from error
+    except MemoryError as error:
+        # SQLite says so where the first bytes of a file ask for more than there is, too.
+        raise InvalidInputError(
+            f"{place}: damaged: to read it takes more memory than there is; expected a memory of atg-fg"
+        ) from error
     except (OverflowError, UnicodeError) as error:
         raise InvalidInputError(f"{place}: cannot be held in a database: {error}") from error
 

@@ -126,6 +126,22 @@ def test_a_statement_that_never_ends_is_ended(path):
     assert time.process_time() - start < 10
 
 
+def test_pages_that_ask_for_all_memory_there_is_are_called_damaged(tmp_path):
+    """A tree of pages that the fuzzer found: SQLite answers it with a ``MemoryError`` of Python's."""
+    content = bytearray(19_039)
+    content[:24] = b"SQLite format 3\0" + bytes([2, 0, 0, 0, 0, 64, 32, 32])
+    content[100:124] = bytes([5, 0, 0, 0, 6, *[0] * 7, 1, 251, 1, 246, 0, 241, 0, 236, 0, 231, 0, 226])
+    content[505], content[510] = 8, 7
+    content[3072:3077] = content[3584:3589] = bytes([13, 0, 0, 0, 4])
+    content[3080:3088] = bytes([0, 53, 0, 149, 1, 0, 0, 50])
+    content[3592:3600] = bytes([1, 67, 0, 83, 1, 0, 0, 225])
+    content[3907:3925] = bytes([255] * 16 + [0, 255])
+    (tmp_path / "greedy.db").write_bytes(content)
+    for read in (memory_files.load_memory, open_memory, faults_of_database):
+        with pytest.raises(InvalidInputError, match=r"greedy\.db: damaged: .* expected a memory of atg-fg"):
+            read(tmp_path / "greedy.db")
+
+
 def test_a_schema_is_told_by_its_text_in_every_version(tmp_path, monkeypatch):
     monkeypatch.setattr(schema, "MIGRATIONS", (*schema.MIGRATIONS, ("ALTER TABLE trials ADD COLUMN note TEXT",)))
     memory_files.save_memory(plain(1), tmp_path / "new.db")
