@@ -339,9 +339,7 @@ class PoseFilter:
         grid = np.zeros((len(joint), self._alphabet.n_symbols**n_slots))
         grid[:, self._places()] = joint
         grid = grid.reshape(len(joint), *shape * n_slots)
-        return [
-            grid.sum(axis=tuple(other + 1 for other in range(n_slots) if other != slot)) for slot in range(n_slots)
-        ]
+        return [grid.sum(axis=tuple(other + 1 for other in range(n_slots) if other != slot)) for slot in range(n_slots)]
 
     def _places(self) -> IntArray:
         """Return where each pattern is among all combinations of symbols, shape [|𝒵|]."""
