@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any, Final
 
 import cv2
@@ -73,7 +73,6 @@ class PictureBoxWorld(FiniteStateWorld):
     Attributes:
         frame: The last camera frame, RGB, shape [height, width, 3].
         crops: The faces in front and on top that were cut out of it, RGB, shape [2, side, side, 3].
-        sense: One that reads these observations and knows no class yet.
 
     Raises:
         InvalidInputError: An option out of its range.
@@ -115,12 +114,17 @@ class PictureBoxWorld(FiniteStateWorld):
             blur=blur,
         )
         self.alphabet = PatternAlphabet(_SLOTS, MOST_CLASSES, exclusive=False)
-        space = calibrated_space(features)
-        self.sense = AppearanceSense(space, self.alphabet, within=_WITHIN)
-        self.observation_space: Any = appearance_space(n_slots, space.n_features)
+        self._features_name = features
+        blank = np.zeros((CROP, CROP, 3), dtype=np.uint8)
+        self.observation_space: Any = appearance_space(n_slots, len(self.features(blank)))
         width, height = self.camera.camera.image_size
         self.frame: NDArray[np.uint8] = np.zeros((height, width, 3), dtype=np.uint8)
         self.crops: NDArray[np.uint8] = np.zeros((n_slots, CROP, CROP, 3), dtype=np.uint8)
+
+    @cached_property
+    def sense(self) -> AppearanceSense:
+        """One that reads these observations and knows no class yet; it takes seconds to calibrate the first one."""
+        return AppearanceSense(calibrated_space(self._features_name), self.alphabet, within=_WITHIN)
 
     @property
     def assumptions(self) -> Assumptions:

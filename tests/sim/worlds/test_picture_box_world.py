@@ -19,6 +19,7 @@ from atg_fg.policies.goal import GoalPolicy
 from atg_fg.senses.appearance import AppearanceSense
 from atg_fg.storage.memory_files import load_memory, open_memory, save_memory
 from atg_fg.storage.presets import preset
+from atg_fg.storage.recorded_header import read_header
 from atg_fg.worlds.arcube import FRONT, ORIENTATIONS, canonical
 from atg_fg.worlds.registry import assumptions_of, make_world_with, sense_of
 from sim.bodies.pictures import PLAIN, make_picture_boxes
@@ -171,3 +172,13 @@ def test_a_goal_can_be_given_by_a_crop(world):
     record = run_trial(world, inference, GoalPolicy(goal), 20, np.random.default_rng(0), reset_options=options)
     assert record.steps[-1].detection[0] == symbol
     assert record.steps[-1].truth["pattern"][0] == shown[ORIENTATIONS[3][FRONT]]
+
+
+def test_a_record_that_names_code_for_features_runs_none_of_it(tmp_path, monkeypatch):
+    ran = tmp_path / "ran"
+    (tmp_path / "mine.py").write_text(f"open({str(ran)!r}, 'w').close()\ndef embed(crop):\n    return [1.0]\n")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    header = {"seed": 0, "world": "picture-box", "world_options": {"features": "mine:embed"}}
+    assumptions = read_header(header, "test.jsonl.gz")[1]
+    assert assumptions.alphabet.slots == ("front", "top")
+    assert not ran.exists()
