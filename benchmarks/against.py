@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import statistics
 import subprocess
 import sys
@@ -84,12 +85,16 @@ class Side:
 
     Args:
         python: The environment's interpreter.
+        home: Folder of the library's code; it comes before whatever else is on the path.
     """
 
-    def __init__(self, python: Path) -> None:
+    def __init__(self, python: Path, home: Path = ROOT) -> None:
         # Without -P the folder of the script, with the modules of the present revision, would come first.
         command = [str(python), "-P", str(ROOT / "benchmarks" / "turns.py")]
-        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        environment = {**os.environ, "PYTHONPATH": str(home)}
+        self._process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True, env=environment
+        )
 
     def turn(self, name: str, arguments: dict[str, Any]) -> Sample:
         """Return the median of each quantity of a turn."""
@@ -127,8 +132,8 @@ def commit_of(revision: str) -> str:
 
 
 @contextmanager
-def built(commit: str) -> Iterator[Path]:
-    """Yield the interpreter of an environment in which the library is that of a commit, and all else as here."""
+def built(commit: str) -> Iterator[tuple[Path, Path]]:
+    """Yield the interpreter of an environment with all libraries of this one, and the code of a commit."""
     with tempfile.TemporaryDirectory() as name:
         tree, environment = Path(name) / "tree", Path(name) / "environment"
         tree.mkdir()
@@ -139,8 +144,8 @@ def built(commit: str) -> Iterator[Path]:
         asked = "import sysconfig; print(sysconfig.get_path('purelib'))"
         there = subprocess.run([str(python), "-c", asked], capture_output=True, text=True, check=True).stdout.strip()
         here = [path for path in sys.path if path and Path(path).name in ("site-packages", "dist-packages")]
-        (Path(there) / "revision.pth").write_text("\n".join([str(tree), *here, sysconfig.get_path("platlib")]) + "\n")
-        yield python
+        (Path(there) / "revision.pth").write_text("\n".join([*here, sysconfig.get_path("platlib")]) + "\n")
+        yield python, tree
 
 
 def measure(
@@ -157,7 +162,7 @@ def measure(
         InvalidInputError: There is no such revision.
     """
     commit, rows = commit_of(revision), []
-    with built(commit) as python, Side(python) as before, Side(Path(sys.executable)) as now:
+    with built(commit) as earlier, Side(*earlier) as before, Side(Path(sys.executable)) as now:
         taken: dict[str, dict[str, dict[str, list[float]]]] = {}
         for figure in figures:
             key = json.dumps(figure.turn)

@@ -28,16 +28,14 @@ def repository(tmp_path, monkeypatch):
             ["-c", "user.name=a", "-c", "user.email=a@b", "commit", "-qm", "one"],
         ):
             subprocess.run(["git", "-C", str(tmp_path), *command], check=True)
-    monkeypatch.setenv("PYTHONPATH", str(tmp_path))
+    monkeypatch.setenv("PYTHONPATH", str(tmp_path))  # which would come before what is installed
     return tmp_path
 
 
-def test_the_turns_of_a_revision_run_its_own_code(repository, monkeypatch):
-    monkeypatch.delenv("PYTHONPATH")
-    with against.built(commit_of("HEAD~1")) as python, Side(python) as side:
-        assert side.turn("any", {}) == {"seconds": 6.0}
-    with against.built(commit_of("HEAD")) as python, Side(python) as side:
-        assert side.turn("any", {}) == {"seconds": 2.0}
+def test_the_turns_of_a_revision_run_its_own_code(repository):
+    for revision, seconds in (("HEAD~1", 6.0), ("HEAD", 2.0)):
+        with against.built(commit_of(revision)) as earlier, Side(*earlier) as side:
+            assert side.turn("any", {}) == {"seconds": seconds}
 
 
 def test_an_unknown_revision_is_one_error(repository):
@@ -48,7 +46,7 @@ def test_an_unknown_revision_is_one_error(repository):
 
 def test_a_side_that_dies_is_not_waited_for(repository):
     (repository / "benchmarks" / "turns.py").write_text("")
-    with Side(Path(sys.executable)) as side, pytest.raises(RuntimeError, match="ended in turn 'any'"):
+    with Side(Path(sys.executable), repository) as side, pytest.raises(RuntimeError, match="ended in turn 'any'"):
         side.turn("any", {})
 
 
@@ -56,7 +54,7 @@ def test_ratios_are_of_the_earlier_code_to_the_present(monkeypatch, tmp_path):
     seconds = {"old": iter([9.0, 8.0, 6.0, 4.0]), "new": iter([9.0, 2.0, 2.0, 2.0])}
 
     class Told:
-        def __init__(self, python):
+        def __init__(self, python, home=None):
             self._name = "old" if python == tmp_path else "new"
 
         def __enter__(self):
@@ -72,7 +70,7 @@ def test_ratios_are_of_the_earlier_code_to_the_present(monkeypatch, tmp_path):
         def __init__(self, commit):
             pass
 
-        __enter__, __exit__ = lambda self: tmp_path, lambda self, *error: None
+        __enter__, __exit__ = lambda self: (tmp_path, tmp_path), lambda self, *error: None
 
     monkeypatch.setattr(against, "Side", Told)
     monkeypatch.setattr(against, "built", Built)
