@@ -21,6 +21,7 @@ from atg_fg.display.structure_words import action_text, register_names
 from atg_fg.learning.completion import CompletedGraph, completed_atg, statuses
 from atg_fg.learning.learner import BelievedStructure
 from atg_fg.learning.predictive_checks import summary_of_evidence
+from atg_fg.learning.shared_structure import SharedStructure
 from atg_fg.learning.structured_memory import StructuredMemory
 from atg_fg.storage import memory_files
 
@@ -121,13 +122,26 @@ def _document(
 
 def _structure_document(each: BelievedStructure, gain: float, memory: StructuredMemory) -> dict[str, Any]:
     names = register_names(each.structure, memory.assumptions.alphabet.slots)
-    actions = zip(memory.assumptions.actions, each.structure.sources, strict=True)
+    members = each.followers > 0.5
+    modes = [_mode_document(each.structure, mode, names, memory) for mode in range(each.structure.n_modes)]
     return {
         "weight": each.weight,
         "gain": gain,
+        "share": each.share,
+        "members": [name for name, is_one in zip(memory.names, members.tolist(), strict=True) if is_one],
         "aspects": len(each.structure.poses().registers),
         "registers": list(names),
-        "sources": {action: [names[source] for source in sources] for action, sources in actions},
+        **({"modes": modes} if len(modes) > 1 else {"sources": modes[0]["sources"]}),
+    }
+
+
+def _mode_document(
+    structure: SharedStructure, mode: int, names: Sequence[str], memory: StructuredMemory
+) -> dict[str, Any]:
+    steps = {action: structure.step(mode, number) for number, action in enumerate(memory.assumptions.actions)}
+    return {
+        "sources": {action: [names[source] for source in sources] for action, (_, sources) in steps.items()},
+        "next": {action: following for action, (following, _) in steps.items()},
     }
 
 
@@ -137,6 +151,12 @@ def _graph_document(graph: CompletedGraph) -> dict[str, Any]:
         "aspects": [{"id": node, **data} for node, data in graph.nodes(data=True)],
         "transitions": [{"from": source, "to": target, **data} for source, target, data in graph.edges(data=True)],
     }
+
+
+def _what_kind(n_members: int, n_poses: int, n_modes: int) -> str:
+    """Return what kind of thing the followers of a structure are, in words."""
+    modes = f" in {n_modes} modes" if n_modes > 1 else ""
+    return f"a kind of {n_members} object{'' if n_members == 1 else 's'} with {n_poses} poses{modes}"
 
 
 def _tell(file: Path, document: dict[str, Any]) -> None:
@@ -151,9 +171,13 @@ def _tell(file: Path, document: dict[str, Any]) -> None:
             f"registers {', '.join(registers)}",
             soft_wrap=True,
         )
-        for action, sources in structure["sources"].items():
-            indices = [registers.index(source) for source in sources]
-            console.print(f"  {action}: {action_text(indices, registers)}", soft_wrap=True)
+        modes = structure.get("modes", [structure])
+        console.print(f"  {_what_kind(len(structure['members']), structure['aspects'], len(modes))}", soft_wrap=True)
+        for mode, maps in enumerate(modes):
+            for action, sources in maps["sources"].items():
+                indices = [registers.index(source) for source in sources]
+                where = f"mode {mode + 1} → {maps['next'][action] + 1}, " if len(modes) > 1 else ""
+                console.print(f"  {where}{action}: {action_text(indices, registers)}", soft_wrap=True)
     rates = ", ".join(f"{name} {value:.4f}" for name, value in document["rates"].items())
     console.print(f"rates: {rates}")
     table = Table()

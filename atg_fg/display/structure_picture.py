@@ -41,9 +41,9 @@ _HIDDEN: Final = "#f1f1f1"
 def draw_structure(structure: SharedStructure, assumptions: Assumptions) -> Figure:
     """Draw the registers and what each action makes of their contents.
 
-    Registers stand on a circle, those in view framed strong; an arrow goes from the register that had a content before
-    the action to the one that has it after. What an action leaves alone is pale; a register whose content is lost has a
-    dashed frame.
+    Each mode has rows of its own. Registers stand on a circle, those in view framed strong; an arrow goes from the
+    register that had a content before the action to the one that has it after. What an action leaves alone is pale; a
+    register whose content is lost has a dashed frame.
 
     Args:
         structure: The structure; about 12 registers are readable.
@@ -54,21 +54,28 @@ def draw_structure(structure: SharedStructure, assumptions: Assumptions) -> Figu
     """
     names = register_names(structure, assumptions.alphabet.slots)
     places = _places(structure)
-    n_rows = -(-structure.n_actions // _COLUMNS)
     n_columns = min(structure.n_actions, _COLUMNS)
+    n_rows_of_mode = -(-structure.n_actions // _COLUMNS)
+    n_rows = n_rows_of_mode * structure.n_modes
+    in_modes = f" in {structure.n_modes} modes" if structure.n_modes > 1 else ""
     with plot_style():
         figure = figure_class()(figsize=(_PANEL * n_columns, (_PANEL + 0.55) * n_rows + 0.45), layout="constrained")
         figure.suptitle(
             f"{structure.n_registers} registers, {structure.n_slots} of them in view; "
-            f"{len(structure.poses().registers)} poses",
+            f"{len(structure.poses().registers)} poses{in_modes}",
             fontsize=11, fontweight="bold",
         )  # fmt: skip
         panels = figure.subplots(n_rows, n_columns, squeeze=False).ravel()
         for axes in panels:
             axes.axis("off")
-        for action, sources in enumerate(structure.sources):
-            _draw_action(panels[action], sources, names, places, structure.n_slots, action_color(action))
-            panels[action].set_title(assumptions.actions[action], color=action_color(action), parse_math=False)
+        for mode, action in itertools.product(range(structure.n_modes), range(structure.n_actions)):
+            axes, color = panels[mode * n_rows_of_mode * n_columns + action], action_color(action)
+            following, sources = structure.step(mode, action)
+            title = assumptions.actions[action]
+            if structure.n_modes > 1:
+                title += f": mode {mode + 1} → {following + 1}"
+            _draw_action(axes, sources, names, places, structure.n_slots, color)
+            axes.set_title(title, color=color, parse_math=False)
     return figure
 
 

@@ -57,8 +57,8 @@ class LearnedStructure(BayesFilter):
         rates = Rates()
         if self.parameters.learn_structure and isinstance(self.memory, StructuredMemory):
             believed, rates = self.memory.learner.believed(self.memory.names), self.memory.learner.rates
-        followers = [each.weight * np.append(each.followers, rates.share) for each in believed]
-        self._log_plain = log_of(1.0 - sum(followers, np.zeros(self.model.n_hypotheses)))
+        followers = [each.weight * np.append(each.followers, each.share) for each in believed]
+        self._log_plain = log_of(np.maximum(1.0 - sum(followers, np.zeros(self.model.n_hypotheses)), 0.0))
         self._followed: list[FollowedStructure | FollowedChain] = [
             FollowedStructure(each, log_of(self.model.prior * follow), rates, self.memory)
             for each, follow in zip(believed, followers, strict=True)

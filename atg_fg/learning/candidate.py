@@ -28,6 +28,7 @@ class Candidate:
 
     Attributes:
         log_evidence: ln p(trial | structure, a fresh object), shape [n].
+        events: Expected slips, wrong looks, repeated symbols and revealed registers of each trial, shape [n, 4].
         contents: What is known of each object, each of shape [P, S].
     """
 
@@ -35,7 +36,7 @@ class Candidate:
         self.structure = structure
         self._alphabet = alphabet
         self.log_evidence: FloatArray = np.zeros(0)
-        self._events: FloatArray = np.zeros((0, 4))
+        self.events: FloatArray = np.zeros((0, 4))
         self.contents: list[FloatArray] = []
 
     def rescore(self, trials: Sequence[RawTrial], owners: Sequence[int], rates: Rates) -> None:
@@ -47,7 +48,7 @@ class Candidate:
             rates: Those in force.
         """
         fresh = score_trials(self.structure, trials, rates, self._alphabet)
-        self.log_evidence, self._events = fresh.log_evidence, fresh.events
+        self.log_evidence, self.events = fresh.log_evidence, fresh.events
         self.contents = []
         later: list[list[int]] = []
         for number, owner in enumerate(owners):
@@ -65,7 +66,7 @@ class Candidate:
         """Score one more trial, and learn from it what its object contains."""
         fresh = score_trials(self.structure, [trial], rates, self._alphabet)
         self.log_evidence = np.concatenate((self.log_evidence, fresh.log_evidence))
-        self._events = np.concatenate((self._events, fresh.events))
+        self.events = np.concatenate((self.events, fresh.events))
         if owner == len(self.contents):
             self.contents.append(fresh.contents[0])
         else:
@@ -104,10 +105,14 @@ class Candidate:
         log_shares = math.lgamma(1.0 + expected) + math.lgamma(1.0 + n - expected) - math.lgamma(2.0 + n)
         return self.structure.log_prior + float(explained) + doubt + log_shares
 
-    def tally(self, trials: Sequence[RawTrial], plain: FloatArray) -> Tally:
-        """Return the expected numbers of events over all trials, each counted as far as it follows the structure."""
-        following = self.responsibilities(plain)
-        slips, wrong, repeats, reveals = following @ self._events
+    def tally(self, trials: Sequence[RawTrial], following: FloatArray) -> Tally:
+        """Return the expected numbers of events over all trials, each counted as far as it follows the structure.
+
+        Args:
+            trials: All raw trials.
+            following: The probability that each follows it, shape [n].
+        """
+        slips, wrong, repeats, reveals = following @ self.events
         n_actions = following @ np.array([len(trial.actions) for trial in trials])
         n_looks = following @ np.array([len(trial.detections) for trial in trials])
         return Tally(*map(float, (slips, n_actions, wrong, n_looks, repeats, reveals)))

@@ -19,6 +19,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -125,7 +126,11 @@ class _Odds:
     @property
     def usual_threshold(self) -> float:
         """Log odds above which two ATGs are taken for one object."""
-        return STRUCTURED_LOG_ODDS if sum(each.weight for each in self._believed) > 0.5 else PLAIN_LOG_ODDS
+        return (
+            STRUCTURED_LOG_ODDS
+            if sum({each.kinds: each.weight for each in self._believed}.values()) > 0.5
+            else PLAIN_LOG_ODDS
+        )
 
     def of(self, index: int, others: Sequence[int]) -> FloatArray:
         """Return the log odds that an ATG is of the same object as each of the others, shape [len(others)]."""
@@ -134,15 +139,24 @@ class _Odds:
         plain = np.array([self._plain_factor(index, other) for other in others])
         if not self._believed:
             return self._log_prior + plain
-        share = self._learner.rates.share
-        terms = [log_of(np.array(1.0 - sum(each.weight for each in self._believed))) + plain]
-        for each in self._believed:
-            mine, theirs = each.followers[index], each.followers[list(others)]
-            weight = each.weight * mine * theirs / share
-            both = log_of(weight)
-            if (weight > 0).any():
-                both = both + self._structure_factors(each, index, others)
-            terms += [both, log_of(each.weight * (1.0 - mine) * (1.0 - theirs) / (1.0 - share)) + plain]
+        sets = [list(kinds) for _, kinds in groupby(self._believed, key=lambda each: each.kinds)]
+        terms = [log_of(np.array(1.0 - sum(kinds[0].weight for kinds in sets))) + plain]
+        for kinds in sets:
+            mine_plain, theirs_plain, plain_share = 1.0, np.ones(len(others)), 1.0
+            for each in kinds:
+                mine, theirs = each.followers[index], each.followers[list(others)]
+                weight = each.weight * mine * theirs / each.share
+                both = log_of(weight)
+                if (weight > 0).any():
+                    both = both + self._structure_factors(each, index, others)
+                terms.append(both)
+                mine_plain, theirs_plain, plain_share = (
+                    mine_plain - mine,
+                    theirs_plain - theirs,
+                    plain_share - each.share,
+                )
+            both_plain = np.maximum(mine_plain, 0.0) * np.maximum(theirs_plain, 0.0) / plain_share
+            terms.append(log_of(kinds[0].weight * both_plain) + plain)
         total: FloatArray = np.logaddexp.reduce(np.array(terms))
         return self._log_prior + total
 

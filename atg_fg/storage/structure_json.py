@@ -12,6 +12,7 @@ from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.checks import number, whole_number
 from atg_fg.core.errors import InvalidInputError, TooLargeError
 from atg_fg.core.patterns import Detection, SlotLikelihoods, check_confidences, check_slots
+from atg_fg.learning.kinds import MAX_KINDS
 from atg_fg.learning.learner import MAX_CANDIDATES, StructureLearner
 from atg_fg.learning.rates import PRIORS, Rates
 from atg_fg.learning.raw_trials import RawTrial
@@ -55,8 +56,10 @@ def read_learner(value: Any, assumptions: Assumptions, names: Sequence[str], pla
     learner = StructureLearner(assumptions, whole_number(fields["seed"], f"{place}.seed", least=0))
     learner.n_evaluations = whole_number(fields.get("evaluations", 0), f"{place}.evaluations", least=0)
     candidates = read_list(fields["candidates"], f"{place}.candidates")
-    if len(candidates) > MAX_CANDIDATES:
-        raise InvalidInputError(f"{place}.candidates: {len(candidates)} structures; expected at most {MAX_CANDIDATES}")
+    if len(candidates) > MAX_CANDIDATES + MAX_KINDS:
+        raise InvalidInputError(
+            f"{place}.candidates: {len(candidates)} structures; expected at most {MAX_CANDIDATES + MAX_KINDS}"
+        )
     structures = [
         read_structure(candidate, assumptions, f"{place}.candidates[{index}]")
         for index, candidate in enumerate(candidates)
@@ -121,11 +124,24 @@ def _read_look(value: Any, assumptions: Assumptions, place: str) -> tuple[Detect
 #: Hidden registers that a file may name; far above what can be learned.
 MAX_REGISTERS: Final = 64
 
+#: The same of modes.
+MAX_FILE_MODES: Final = 8
+
 
 def write_structure(structure: SharedStructure, assumptions: Assumptions) -> dict[str, Any]:
-    """Return a structure as JSON knows it."""
-    sources = {name: list(each) for name, each in zip(assumptions.actions, structure.sources, strict=True)}
-    return {"registers": structure.n_registers, "sources": sources}
+    """Return a structure as JSON knows it; of several modes it has a list with the maps and the next modes of each."""
+    names = assumptions.actions
+    maps = [
+        {name: list(structure.step(mode, action)[1]) for action, name in enumerate(names)}
+        for mode in range(structure.n_modes)
+    ]
+    if structure.n_modes == 1:
+        return {"registers": structure.n_registers, "sources": maps[0]}
+    modes = [
+        {"sources": sources, "next": dict(zip(names, following, strict=True))}
+        for sources, following in zip(maps, structure.next_modes, strict=True)
+    ]
+    return {"registers": structure.n_registers, "modes": modes}
 
 
 def read_structure(value: Any, assumptions: Assumptions, place: str) -> SharedStructure:
@@ -134,18 +150,49 @@ def read_structure(value: Any, assumptions: Assumptions, place: str) -> SharedSt
     Raises:
         InvalidInputError: It is none for these slots and actions; the message names the place.
     """
-    fields = read_object(value, place, ("registers", "sources"))
+    has_modes = isinstance(value, dict) and "modes" in value
+    fields = read_object(value, place, ("registers", "modes" if has_modes else "sources"))
     n_registers = whole_number(fields["registers"], f"{place}.registers", least=len(assumptions.alphabet.slots))
     if n_registers > MAX_REGISTERS:
         raise InvalidInputError(f"{place}.registers: {n_registers}; expected at most {MAX_REGISTERS}")
-    by_action = read_object(fields["sources"], f"{place}.sources", assumptions.actions)
-    sources = [_read_sources(by_action[name], n_registers, f"{place}.sources.{name}") for name in assumptions.actions]
-    structure = SharedStructure(len(assumptions.alphabet.slots), tuple(sources)).canonical()
+    next_modes: tuple[tuple[int, ...], ...] = ()
+    if has_modes:
+        modes = read_list(fields["modes"], f"{place}.modes")
+        if not 2 <= len(modes) <= MAX_FILE_MODES:
+            raise InvalidInputError(f"{place}.modes: {len(modes)}; expected 2 to {MAX_FILE_MODES} of them")
+        places = [f"{place}.modes[{index}]" for index in range(len(modes))]
+        each = [read_object(mode, where, ("sources", "next")) for mode, where in zip(modes, places, strict=True)]
+        maps = [
+            source
+            for mode, where in zip(each, places, strict=True)
+            for source in _read_maps(mode["sources"], n_registers, assumptions, f"{where}.sources")
+        ]
+        next_modes = tuple(
+            _read_next_modes(mode["next"], len(modes), assumptions, f"{where}.next")
+            for mode, where in zip(each, places, strict=True)
+        )
+    else:
+        maps = _read_maps(fields["sources"], n_registers, assumptions, f"{place}.sources")
+    structure = SharedStructure(len(assumptions.alphabet.slots), tuple(maps), next_modes).canonical()
     try:
         structure.poses()
     except TooLargeError as error:
         raise InvalidInputError(f"{place}: {error}") from error
     return structure
+
+
+def _read_maps(value: Any, n_registers: int, assumptions: Assumptions, place: str) -> list[tuple[int, ...]]:
+    by_action = read_object(value, place, assumptions.actions)
+    return [_read_sources(by_action[name], n_registers, f"{place}.{name}") for name in assumptions.actions]
+
+
+def _read_next_modes(value: Any, n_modes: int, assumptions: Assumptions, place: str) -> tuple[int, ...]:
+    by_action = read_object(value, place, assumptions.actions)
+    following = tuple(whole_number(by_action[name], f"{place}.{name}", least=0) for name in assumptions.actions)
+    for name, mode in zip(assumptions.actions, following, strict=True):
+        if mode >= n_modes:
+            raise InvalidInputError(f"{place}.{name}: {mode}; expected 0 to {n_modes - 1}")
+    return following
 
 
 def _read_sources(value: Any, n_registers: int, place: str) -> tuple[int, ...]:

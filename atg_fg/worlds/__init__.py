@@ -14,6 +14,7 @@ for _id, _family in {
     "LidBox": "lid-box",
     "RandomATG": "random-atg",
     "HalfAndHalf": "half-and-half",
+    "MixedKinds": "mixed",
     "RepeatedTags": "repeated-tags",
 }.items():
     gymnasium.register(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from functools import partial
 from typing import Any, Final, TypeAlias
@@ -195,6 +196,40 @@ def half_and_half(n_objects: int, seed: int, *, n_successors: int = 3, concentra
     return ObjectFamily(_CUBE_ACTIONS, _CUBE_ALPHABET, cubes + _different(n_random, draw, rng))
 
 
+def mixed_kinds(
+    n_objects: int, seed: int, *, cubes: float = 1 / 3, prisms: float = 1 / 3, locks: float = 1 / 3
+) -> ObjectFamily:
+    """Return ARcubes, then hexagonal prisms, then ring locks, with one alphabet and the same actions.
+
+    Args:
+        n_objects: How many.
+        seed: Of all that is drawn.
+        cubes: Share of the cubes, in proportion to the others'; of a rest, the first kinds have one more.
+        prisms: Share of the prisms.
+        locks: Share of the locks.
+
+    Raises:
+        InvalidInputError: A share that is no probability, or all of them are zero.
+    """
+    whole_number(n_objects, "n_objects", 1)
+    named = {"cubes": cubes, "prisms": prisms, "locks": locks}
+    shares = [probability_option(name, share) for name, share in named.items()]
+    if not sum(shares) > 0:
+        raise InvalidInputError("cubes, prisms, locks: all 0; expected a share of one kind at least")
+    exact = [n_objects * share / sum(shares) for share in shares]
+    counts = [math.floor(each + 1e-9) for each in exact]
+    rest = sorted(range(len(counts)), key=lambda kind: counts[kind] - exact[kind] - 1e-9 * (len(counts) - kind))
+    for kind in rest[: n_objects - sum(counts)]:
+        counts[kind] += 1
+    rng = _generator(seed)
+    objects = _different(counts[0], _draw_cube, rng)
+    for family, n_of_kind in ((hexagonal_prisms, counts[1]), (ring_locks, counts[2])):
+        own_seed = int(rng.integers(2**63))
+        if n_of_kind:
+            objects += family(n_of_kind, own_seed, n_symbols=N_TAGS).objects
+    return ObjectFamily(_CUBE_ACTIONS, _CUBE_ALPHABET, objects)
+
+
 def cubes_with_repeated_tags(n_objects: int, seed: int, *, share: float = 1 / 3) -> ObjectFamily:
     """Return ARcubes, a share of which has one tag twice, on two opposite faces.
 
@@ -270,5 +305,6 @@ FAMILIES: Final[dict[str, Callable[..., ObjectFamily]]] = {
     "lid-box": lid_boxes,
     "random-atg": random_atgs,
     "half-and-half": half_and_half,
+    "mixed": mixed_kinds,
     "repeated-tags": cubes_with_repeated_tags,
 }

@@ -29,6 +29,7 @@ WORLDS: Final[dict[str, str]] = {
     "lid-box": "atg_fg.worlds:atg_fg/LidBox-v0",
     "random-atg": "atg_fg.worlds:atg_fg/RandomATG-v0",
     "half-and-half": "atg_fg.worlds:atg_fg/HalfAndHalf-v0",
+    "mixed": "atg_fg.worlds:atg_fg/MixedKinds-v0",
     "repeated-tags": "atg_fg.worlds:atg_fg/RepeatedTags-v0",
     "detector": "atg_fg.worlds:atg_fg/Detector-v0",
 }

@@ -1,13 +1,27 @@
+import json
 from dataclasses import astuple
 
 import numpy as np
 import pytest
 
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.learning.learner import StructureLearner, is_milestone
+from atg_fg.learning.learner import N_DRAWS, StructureLearner, is_milestone
 from atg_fg.learning.rates import Rates
+from atg_fg.storage.structure_json import read_learner, write_learner
 from atg_fg.worlds.families import hexagonal_prisms
-from tests.learning.worlds import ARCUBES, CUBE, RING, RING_WORLD, Object, cubes, objects_of, random_objects, trial_of
+from tests.learning.worlds import (
+    ARCUBES,
+    CUBE,
+    PRISM,
+    RING,
+    RING_WORLD,
+    Object,
+    cubes,
+    objects_of,
+    prisms,
+    random_objects,
+    trial_of,
+)
 
 
 def learned(objects, order, seed=0, n_actions=10, assumptions=ARCUBES, **noise):
@@ -34,7 +48,8 @@ def test_where_there_is_no_structure_none_is_believed_and_the_search_is_bounded(
     weights = [each.weight for each in learner.believed([])]
     assert sum(weights) < 0.02
     milestones = sum(is_milestone(n) for n in range(1, 16))
-    assert learner.n_evaluations == milestones * 14_700
+    annealed, merged = milestones * 14_700, (milestones - 2) * (N_DRAWS[0] + 35 * N_DRAWS[1])
+    assert learner.n_evaluations == annealed + merged
 
 
 def test_of_half_and_half_each_object_is_told_apart():
@@ -46,6 +61,46 @@ def test_of_half_and_half_each_object_is_told_apart():
     assert (best.followers[:10] > 0.99).all()
     assert (best.followers[10:] < 0.01).all()
     assert learner.rates.share == pytest.approx(0.5, abs=0.15)
+
+
+def test_prisms_are_learned_with_their_two_modes():
+    learner = learned(prisms(13), range(13))
+    best = learner.believed(["0", "12"])[0]
+    assert best.structure == PRISM
+    assert best.weight > 0.99
+    assert (best.followers > 0.99).all()
+
+
+@pytest.fixture(scope="module")
+def mixed():
+    order = np.random.default_rng(0).permutation(22)
+    return learned([*cubes(7), *prisms(15)], order)
+
+
+def test_each_object_of_two_kinds_is_of_its_own(mixed):
+    believed = {each.structure: each for each in mixed.believed([str(number) for number in range(22)])}
+    assert believed.keys() == {CUBE, PRISM}
+    assert (believed[CUBE].followers > 0.99).tolist() == [True] * 7 + [False] * 15
+    assert (believed[PRISM].followers > 0.99).tolist() == [False] * 7 + [True] * 15
+    assert believed[CUBE].share == pytest.approx(8 / 25, abs=0.02)
+    assert believed[PRISM].share == pytest.approx(16 / 25, abs=0.02)
+    assert {(each.weight, each.kinds) for each in believed.values()} == {(1.0, 0)}
+
+
+def test_kinds_are_better_than_any_structure_alone(mixed):
+    plain = np.array(mixed._plain)
+    assert mixed.gain > max(each.score(plain) - plain.sum() for each in mixed._candidates) + 50
+
+
+def test_kinds_are_the_same_after_they_were_kept(mixed):
+    document = json.loads(json.dumps(write_learner(mixed)))
+    names = [str(number) for number in range(22)]
+    again = read_learner(document, ARCUBES, names, "here")
+    assert again.same_as(mixed)
+    for mine, yours in zip(mixed.believed(names), again.believed(names), strict=True):
+        assert mine.structure == yours.structure
+        assert mine.followers == pytest.approx(yours.followers)
+        assert mine.share == pytest.approx(yours.share)
 
 
 @pytest.mark.slow

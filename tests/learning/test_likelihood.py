@@ -1,5 +1,6 @@
 """The filter against exact fractions: exact where it says so, and how far off where it does not."""
 
+import itertools
 import math
 from fractions import Fraction
 
@@ -88,6 +89,32 @@ def test_the_sum_over_all_contents_is_that_of_plain_loops(structure):
         trial = trial_of(shown, 3, rng, slip=0.2, wrong=0.2, missing=0.2)
         actual = exact_log_evidence(structure, trial, OFTEN, ALPHABET)
         assert actual == pytest.approx(math.log(exact.fresh(trial.detections, trial.actions)), abs=1e-12)
+
+
+def test_with_modes_it_is_the_sum_over_every_mode_arrangement_and_contents():
+    # Its loops know of no poses: a walk through the maps themselves, from every mode and arrangement that is reached.
+    structure = SharedStructure(2, ((1, 0, 2), (1, 2, 0), (0, 1, 2), (0, 2, 1)), ((1, 0), (0, 1)))
+    rng = np.random.default_rng(7)
+    reached = [(0, (0, 1, 2))]
+    for mode, places in reached:
+        for action in range(2):
+            target, sources = structure.step(mode, action)
+            new = target, tuple(places[source] for source in sources)
+            reached += [new] if new not in reached else []
+    contents = list(itertools.permutations(range(5), 3))
+    for (shown,) in (objects_of(structure, [rng.permutation(5)[:3].tolist()]) for _ in range(6)):
+        trial = trial_of(shown, 4, rng)
+        explained = 0
+        for (mode, places), symbols in itertools.product(reached, contents):
+            seen = [tuple(symbols[place] for place in places[:2])]
+            for action in trial.actions:
+                mode, sources = structure.step(mode, action)
+                places = tuple(places[source] for source in sources)
+                seen.append(tuple(symbols[place] for place in places[:2]))
+            explained += tuple(seen) == trial.detections
+        expected = math.log(explained / len(reached) / len(contents))
+        (actual,) = score_trials(structure, [trial], NEVER, ALPHABET).log_evidence
+        assert actual == pytest.approx(expected, abs=1e-7)
 
 
 def test_trials_of_different_lengths_are_scored_as_they_are_alone():

@@ -1,4 +1,5 @@
 import itertools
+import json
 import math
 
 import networkx
@@ -11,7 +12,7 @@ from atg_fg.core.errors import InvalidInputError, TooLargeError
 from atg_fg.learning.shared_structure import SharedStructure
 from atg_fg.storage.structure_json import read_structure, write_structure
 from atg_fg.worlds.arcube import SUCCESSORS
-from tests.learning.worlds import ARCUBES, BOX, CUBE, DOUBLE, RING
+from tests.learning.worlds import ARCUBES, BOX, CUBE, DOUBLE, PRISM, RING
 
 
 @st.composite
@@ -202,3 +203,91 @@ def test_a_structure_with_too_many_poses_is_refused_in_a_file():
 
 def test_the_ring_has_six_poses():
     assert len(RING.poses().registers) == 6
+
+
+def renamed(structure, modes, hidden):
+    """A structure with modes in another order, and with other names of the hidden registers of each mode."""
+    places = [(0, 1, *each) for each in hidden]
+    maps = []
+    for mode in modes:
+        for action in range(structure.n_actions):
+            target, sources = structure.step(mode, action)
+            row = [0] * structure.n_registers
+            for register, source in enumerate(sources):
+                row[places[target][register]] = places[mode][source]
+            maps.append(tuple(row))
+    following = [[modes.index(structure.step(mode, action)[0]) for action in range(3)] for mode in modes]
+    return SharedStructure(structure.n_slots, tuple(maps), tuple(map(tuple, following)))
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("modes", [(0, 1), (1, 0)])
+def test_the_names_of_modes_and_of_their_hidden_registers_make_no_difference(seed, modes):
+    rng = np.random.default_rng(seed)
+    other = renamed(PRISM, modes, [(2 + rng.permutation(6)).tolist() for _ in range(2)])
+    assert other.canonical() == PRISM
+    assert other.log_prior == pytest.approx(PRISM.log_prior)
+    assert len(other.poses().registers) == 24
+
+
+def test_the_prior_of_two_modes_by_hand():
+    # Of 8! permutations, 6 of them; 6 hidden registers of either mode and two modes by any names.
+    each = np.log(0.5 * 0.9 / math.factorial(8))
+    first = np.log(0.9 / math.factorial(8))
+    names = 2 * math.lgamma(7) + math.log(2)
+    expected = 3 * first + 3 * each + names - 6 * math.log(2) + math.log(0.2) - 6 * math.log(2)
+    assert PRISM.log_prior == pytest.approx(expected)
+
+
+def test_a_map_that_is_alike_in_both_modes_costs_little():
+    tied = SharedStructure(2, (*RING.sources, *RING.sources), ((1, 0), (0, 1)))
+    assert tied.log_prior > RING.log_prior + math.log(2 * 0.2 / 2**4 * 0.5**2) - 1e-9
+    assert tied.log_prior < RING.log_prior
+
+
+def test_modes_that_are_alike_make_no_more_poses():
+    tied = SharedStructure(2, (*RING.sources, *RING.sources), ((1, 0), (0, 1)))
+    alone, both = RING.poses(), tied.poses()
+    assert len(both.registers) == len(alone.registers)
+    assert both.first.tolist() == alone.first.tolist()
+
+
+def test_a_new_prism_stands_or_lies_and_all_else_is_names():
+    poses = PRISM.poses()
+    assert len(poses.first) == 2
+    assert poses.first_weights.tolist() == [0.5, 0.5]
+
+
+def test_a_mode_that_is_never_reached_is_dropped():
+    beside = SharedStructure(2, (*RING.sources, (0, 1, 2), (0, 1, 2)), ((0, 0), (1, 1)))
+    assert beside.canonical() == RING.canonical()
+
+
+@pytest.mark.parametrize("following", [((0, 0),), ((0, 2), (1, 0)), ((0,), (1,)), ((0, -1), (0, 0))])
+def test_next_modes_that_are_none_are_refused(following):
+    with pytest.raises(InvalidInputError, match="next modes"):
+        SharedStructure(2, (*RING.sources, *RING.sources), following)
+
+
+def test_a_structure_with_modes_is_kept_in_a_file():
+    document = json.loads(json.dumps(write_structure(PRISM, ARCUBES)))
+    assert len(document["modes"]) == 2
+    assert read_structure(document, ARCUBES, "here") == PRISM
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (lambda d: d.update(modes=d["modes"][:1]), r"here\.modes: 1; expected 2 to 8 of them"),
+        (lambda d: d.update(modes=d["modes"] * 9), r"here\.modes: 18; expected 2 to 8 of them"),
+        (lambda d: d["modes"][1]["next"].update(left=2), r"here\.modes\[1\]\.next\.left: 2; expected 0 to 1"),
+        (lambda d: d["modes"][0]["sources"].update(flip=[0]), r"here\.modes\[0\]\.sources\.flip"),
+        (lambda d: d["modes"][0].pop("next"), r"here\.modes\[0\]"),
+        (lambda d: d.update(sources={}), "here"),
+    ],
+)
+def test_modes_in_a_file_that_are_none_are_refused(change, message):
+    document = json.loads(json.dumps(write_structure(PRISM, ARCUBES)))
+    change(document)
+    with pytest.raises(InvalidInputError, match=message):
+        read_structure(document, ARCUBES, "here")

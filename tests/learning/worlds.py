@@ -27,6 +27,43 @@ RING = SharedStructure(2, ((1, 2, 0), (1, 0, 2)))
 BOX = SharedStructure(2, ((0, 3, 2, 3), (2, 1, 0, 3))).canonical()
 #: One register in view may come into both slots, which then cannot show it: slots never show the same.
 DOUBLE = SharedStructure(2, ((0, 2, 2), (1, 0, 2)))
+
+
+def _prism() -> SharedStructure:
+    """A hexagonal prism, by its geometry: 6 sides in the order of a turn to the left, and 2 ends.
+
+    While it stands, a side is in front and an end on top; while it lies, an end in front and a side on top.
+    """
+
+    def standing(turn: int) -> int:
+        return 0 if turn % 6 == 0 else turn % 6 + 1
+
+    def lying(turn: int) -> int:
+        return 1 if turn % 6 == 0 else turn % 6 + 1
+
+    maps = []
+    for place, end, mirrored, other, ends in ((standing, 1, False, lying, (7, 0)), (lying, 0, True, standing, (1, 7))):
+        # What a tip makes of it: seen from the other end, sides go round the other way.
+        tip = [0] * 8
+        for turn in range(6):
+            tip[place(turn)] = other(turn) if not mirrored else other(3 - turn)
+        tip[end], tip[7] = ends
+        turned = []
+        for step in (1, -1):
+            row = [0] * 8
+            row[end], row[7] = end, 7
+            for turn in range(6):
+                row[place(turn)] = place(turn + step)
+            turned.append(tuple(row))
+        maps.append((tuple(tip), *turned))
+    # A map belongs to the mode before the action: the tip that makes it stand is that of lying.
+    (stand, *rolls), (lie, *rolls_lying) = maps
+    return SharedStructure(2, (lie, *rolls, stand, *rolls_lying), PRISM_MODES)
+
+
+#: Where flip, left and right lead from standing and from lying.
+PRISM_MODES = ((1, 0, 0), (0, 1, 1))
+PRISM = _prism().canonical()
 RING_WORLD = Assumptions(4, 6, ("turn", "swap"), PatternAlphabet(("left", "right"), 5))
 #: Nothing goes wrong, as far as rates allow.
 NEVER = Rates(slip=1e-12, wrong=1e-12, repeat=1e-12)
@@ -51,6 +88,11 @@ def objects_of(structure: SharedStructure, contents: Sequence[Sequence[int]]) ->
     poses = structure.poses()
     in_view = poses.registers[:, : structure.n_slots]
     return [Object([tuple(row) for row in np.array(each)[in_view].tolist()], poses.successors) for each in contents]
+
+
+def prisms(n: int, seed: int = 0) -> list[Object]:
+    rng = np.random.default_rng(seed)
+    return objects_of(PRISM, [rng.permutation(12)[:8].tolist() for _ in range(n)])
 
 
 def random_objects(n: int, rng: np.random.Generator, n_states: int = 24) -> list[Object]:

@@ -11,6 +11,7 @@ from atg_fg.worlds.families import (
     half_and_half,
     hexagonal_prisms,
     lid_boxes,
+    mixed_kinds,
     random_atgs,
     ring_locks,
 )
@@ -232,6 +233,27 @@ class TestCubes:
         family = half_and_half(n, 0)
         assert sum(map(self.is_cube, family.objects)) == n_cubes
         assert family.assumptions.n_aspects == 24
+
+    @pytest.mark.parametrize(
+        ("n", "shares", "counts"),
+        [
+            (100, {}, [34, 33, 33]),
+            (8, {"cubes": 0.5, "prisms": 0.25, "locks": 0.25}, [4, 2, 2]),
+            (7, {"cubes": 0, "prisms": 1, "locks": 0.4}, [0, 5, 2]),
+            (1, {}, [1, 0, 0]),
+        ],
+    )
+    def test_kinds_are_mixed_by_their_shares(self, n, shares, counts):
+        family = mixed_kinds(n, 0, **shares)
+        n_cubes, n_prisms, n_locks = counts
+        assert [*map(self.is_cube, family.objects)] == [True] * n_cubes + [False] * (n - n_cubes)
+        assert [thing.n_aspects for thing in family.objects] == [24] * (n_cubes + n_prisms) + [18] * n_locks
+        assert len({thing.appearance for thing in family.objects}) == n
+
+    @pytest.mark.parametrize("shares", [{"cubes": 0, "prisms": 0, "locks": 0}, {"cubes": -0.1}, {"locks": 1.1}])
+    def test_shares_of_no_kind_are_refused(self, shares):
+        with pytest.raises(InvalidInputError, match=r"cubes|locks"):
+            mixed_kinds(10, 0, **shares)
 
     def test_one_object_has_no_halves(self):
         with pytest.raises(InvalidInputError, match="n_objects: 1; expected a whole number of at least 2"):

@@ -1,0 +1,92 @@
+"""Structures read off from trials that merge."""
+
+import numpy as np
+import pytest
+
+from atg_fg.learning.raw_trials import RawTrial
+from atg_fg.learning.shared_structure import is_permutation
+from atg_fg.learning.state_merging import merge_states, mode_automata
+from tests.learning.worlds import CUBE, PRISM, PRISM_MODES, RING, cubes, objects_of, prisms, random_objects, trial_of
+
+ONE_MODE = ((0, 0, 0),)
+
+
+def trials_of(objects, seed=0, n_actions=10):
+    rng = np.random.default_rng(seed)
+    return [trial_of(each, n_actions, rng) for each in objects]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_trials_of_cubes_merge_into_the_cube(seed):
+    merged = merge_states(trials_of(cubes(12, seed), seed), ONE_MODE)
+    assert merged.structure == CUBE
+    assert merged.n_trials == 12
+
+
+def test_small_rings_merge_into_the_ring():
+    rng = np.random.default_rng(0)
+    objects = objects_of(RING, [rng.permutation(5)[:3] for _ in range(4)])
+    assert merge_states(trials_of(objects, n_actions=8), ((0, 0),)).structure == RING.canonical()
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_trials_of_prisms_merge_into_the_prism_with_its_two_modes_alone(seed):
+    trials = trials_of(prisms(12, seed), seed)
+    assert merge_states(trials, ONE_MODE) is None
+    found = {modes: merged for modes in mode_automata(2, 3) if (merged := merge_states(trials, modes))}
+    assert list(found) == [PRISM_MODES]
+    assert found[PRISM_MODES].structure == PRISM
+    assert len(PRISM.poses().registers) == 24
+
+
+def test_objects_that_share_nothing_do_not_merge():
+    trials = trials_of(random_objects(12, np.random.default_rng(0)))
+    for n_modes in (1, 2):
+        assert [merge_states(trials, modes) for modes in mode_automata(n_modes, 3)].count(None) == len(
+            mode_automata(n_modes, 3)
+        )
+
+
+def test_a_trial_with_a_fault_is_left_out():
+    trials = trials_of(cubes(12))
+    looks = list(trials[6].detections)
+    looks[5] = looks[5][::-1]
+    trials[6] = RawTrial(tuple(looks), trials[6].actions)
+    merged = merge_states(trials, ONE_MODE)
+    assert (merged.structure, merged.n_trials) == (CUBE, 11)
+
+
+def test_actions_that_were_exchanged_are_found_out():
+    """A fault planted in what was done rather than in what was seen."""
+    trials = trials_of(cubes(12))
+    exchanged = tuple({0: 1, 1: 0}.get(action, action) for action in trials[4].actions)
+    trials[4] = RawTrial(trials[4].detections, exchanged)
+    assert merge_states(trials, ONE_MODE).n_trials == 11
+
+
+def test_looks_with_missing_symbols_or_one_twice_are_passed_over():
+    trials = trials_of(cubes(12))
+    trials[2] = RawTrial(((None, 3), *trials[2].detections[1:]), trials[2].actions)
+    trials[3] = RawTrial(((3, 3), *trials[3].detections[1:]), trials[3].actions)
+    assert merge_states(trials, ONE_MODE).n_trials == 10
+    assert merge_states(trials[2:4], ONE_MODE) is None
+
+
+def test_the_order_of_trials_does_not_matter_where_all_agree():
+    trials = trials_of(prisms(12))
+    assert merge_states(trials[::-1], PRISM_MODES).structure == PRISM
+
+
+def test_what_no_trial_says_is_filled_up_with_permutations():
+    merged = merge_states([RawTrial(((0, 1), (2, 0)), (1,)), RawTrial(((5, 4), (3, 5)), (1,))], ONE_MODE)
+    assert merged.n_trials == 2
+    assert all(map(is_permutation, merged.structure.sources))
+
+
+def test_mode_automata_are_all_up_to_the_names_of_modes():
+    assert mode_automata(1, 3) == (ONE_MODE,)
+    found = mode_automata(2, 2)
+    # Of 16 automata of two modes and two actions one keeps the modes apart; 0 and 1 exchanged they pair up.
+    assert len(found) == len(set(found))
+    assert ((0, 1), (1, 0)) in found or ((1, 0), (0, 1)) in found
+    assert ((0, 0), (1, 1)) not in found
