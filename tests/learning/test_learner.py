@@ -77,6 +77,7 @@ def mixed():
     return learned([*cubes(7), *prisms(15)], order)
 
 
+@pytest.mark.slow
 def test_each_object_of_two_kinds_is_of_its_own(mixed):
     believed = {each.structure: each for each in mixed.believed([str(number) for number in range(22)])}
     assert believed.keys() == {CUBE, PRISM}
@@ -87,11 +88,13 @@ def test_each_object_of_two_kinds_is_of_its_own(mixed):
     assert {(each.weight, each.kinds) for each in believed.values()} == {(1.0, 0)}
 
 
+@pytest.mark.slow
 def test_kinds_are_better_than_any_structure_alone(mixed):
     plain = np.array(mixed._plain)
     assert mixed.gain > max(each.score(plain) - plain.sum() for each in mixed._candidates) + 50
 
 
+@pytest.mark.slow
 def test_kinds_are_the_same_after_they_were_kept(mixed):
     document = json.loads(json.dumps(write_learner(mixed)))
     names = [str(number) for number in range(22)]
@@ -189,10 +192,12 @@ def test_a_rate_is_between_0_and_1(rate):
         Rates(slip=rate)
 
 
-def test_a_structure_that_is_nearly_right_is_not_believed():
+def test_a_structure_that_is_nearly_right_is_not_believed_beside_the_right_one():
     # What an action does to a prism's sides depends on whether it stands, so that no permutation of few registers
-    # explains it without taking every sixth look for an error.
+    # explains it without taking every sixth look for an error; with two modes each look is explained.
     family = hexagonal_prisms(60, 0)
     objects = [Object(each.patterns, each.mechanism.successors[:, :, 0]) for each in family.objects]
     learner = learned(objects, range(60), seed=1)
-    assert sum(each.weight for each in learner.believed(["0"])) < 0.01
+    (best,) = learner.believed(["0"])
+    assert best.structure == PRISM
+    assert best.weight > 0.99
