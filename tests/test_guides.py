@@ -160,3 +160,40 @@ def test_the_guide_to_webcams_comes_to_the_verdicts_that_it_tells(webcam_guide):
     assert re.findall(r"learned: (\S+)", learned) == ["object-000", "object-001", "object-002"]
     told = re.search(r"after two turns each: `(\S+)`, `(\S+)`, `(\S+)`", (DOCS / "with_a_webcam.md").read_text())
     assert re.findall(r"verdict: (\S+)", recognised) == list(told.groups())
+
+
+@pytest.mark.slow
+def test_the_guides_to_ones_own_data_print_what_they_say(tmp_path, monkeypatch):
+    for needed in ("numba", "jinja2"):
+        pytest.importorskip(needed)
+    monkeypatch.syspath_prepend(DOCS)
+    import tour
+
+    shown = [*blocks("your_data.md", "console"), *blocks("noisy_detectors.md", "console")]
+    for command in [command for block in shown for command in tour.commands_in(block)]:
+        done = tour.run(command.line, tmp_path)
+        assert done.returncode == 0, f"{command.line}: {done.stderr}"
+        lines = tour.printed(done.stdout)
+        assert lines[: len(command.output)] == command.output, command.line
+        assert lines == command.output if not command.cut else lines[-len(command.end) :] == command.end, command.line
+    assert "barcode" in (tmp_path / "page.html").read_text()
+
+
+def test_the_bag_of_the_guide_is_read_by_its_topics(tmp_path):
+    from atg_fg.storage.rosbag_recordings import read_topics
+
+    (topics,) = blocks("your_data.md", "json")
+    (tmp_path / "topics.json").write_text(topics)
+    found = read_topics(tmp_path / "topics.json")
+    assert found.slots["label"].topic == "/detections"
+    assert (found.action.label, found.trial.topic) == ("data", "/trial")
+
+
+def test_the_formats_page_shows_a_recording_that_is_read(tmp_path):
+    from atg_fg.storage.recordings import read_recording
+
+    (lines,) = [block for block in blocks("file_formats.md", "json") if "atg-fg/recording" in block]
+    (tmp_path / "looks.jsonl").write_text(lines)
+    (trial,) = read_recording(tmp_path / "looks.jsonl").trials
+    assert (trial.name, trial.object, trial.actions) == ("0", "cup", ("rotate",))
+    assert trial.looks[1].weights == ({"lid": 0.2, "logo": 0.8},)

@@ -113,6 +113,9 @@ def simulate(
     missing: options.Missing = 0.0,
     world_option: options.WorldOption = None,
     seed: Annotated[int, typer.Option(min=0, help="Seed of objects, trials and actions.")] = 0,
+    objects_seed: Annotated[
+        int | None, typer.Option(min=0, help="Seed of the recording whose objects these are; --seed if not given.")
+    ] = None,
 ) -> None:
     """Record trials in a world, acted on at random: a recording with the truth in its column `object`.
 
@@ -120,5 +123,5 @@ def simulate(
     """
     plain_files.check_writable(output)
     own = options.world_options(slip, wrong, missing, own=world_option)
-    write_recording(simulated_recording(world, objects, trials, actions, seed, **own), output)
+    write_recording(simulated_recording(world, objects, trials, actions, seed, objects_seed, **own), output)
     say(f"saved: {output}")

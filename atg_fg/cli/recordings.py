@@ -30,6 +30,7 @@ from atg_fg.storage.presets import preset as preset_named
 from atg_fg.storage.recordings import (
     RecordingSpec,
     merged_spec,
+    oddities,
     read_recording,
     read_spec,
 )
@@ -93,7 +94,7 @@ def learn(
                     recorded_trials.recognise(each, kept, chosen, parameters, learn=True, on_trial=advance)
         if not kept.is_kept:
             save_memory(kept, memory)
-        document = {"command": "learn", **_learned(kept, memory)}
+        document = {"command": "learn", **_learned(kept, memory, recordings)}
     options.write_json(document, json_file)
     if json_file != "-":
         _tell_learned(document)
@@ -154,7 +155,7 @@ def recognise(
             "command": "recognise",
             "trials": [recorded_trials.trial_document(each) for each in found],
             "score": scored,
-            "warnings": _warnings(kept),
+            "warnings": [*_warnings(kept, recordings), *recorded_trials.improbable_trials(found)],
         }
         if write_page is not None and report is not None:
             write_page(found, kept, scored, report)
@@ -228,7 +229,7 @@ def _page_writer() -> Any:
     return loaded("page", pages["recognised"])
 
 
-def _learned(memory: RobotMemory, path: Path) -> dict[str, Any]:
+def _learned(memory: RobotMemory, path: Path, recordings: Sequence[Recording]) -> dict[str, Any]:
     evidence = summary_of_evidence(memory) if isinstance(memory, StructuredMemory) else {}
     trials = len(memory.learner.trials) if isinstance(memory, StructuredMemory) else None
     return {
@@ -237,20 +238,27 @@ def _learned(memory: RobotMemory, path: Path) -> dict[str, Any]:
         "trials": trials,
         "wrong": evidence.get("wrong"),
         "slip": evidence.get("slip"),
-        "warnings": _warnings(memory),
+        "warnings": _warnings(memory, recordings),
     }
 
 
-def _warnings(memory: RobotMemory) -> list[str]:
-    """Return which assumptions do not seem to hold."""
-    if isinstance(memory, StructuredMemory):
-        found = summary_of_evidence(memory).get("warnings", [])
-        if found:
-            return list(found)
+def _warnings(memory: RobotMemory, recordings: Sequence[Recording]) -> list[str]:
+    """Return which assumptions do not seem to hold, by what was learned and what was recorded."""
     n_objects = memory.assumptions.n_objects
-    if len(memory) <= n_objects:
-        return []
-    return [f"{len(memory)} ATGs, but n_objects is {n_objects}: there are more objects, or one has several ATGs"]
+    warnings = list(summary_of_evidence(memory).get("warnings", [])) if isinstance(memory, StructuredMemory) else []
+    if not warnings and len(memory) > n_objects:
+        warnings = [
+            f"{len(memory)} ATGs, but n_objects is {n_objects}: there are more objects, or one has several ATGs"
+        ]
+    return [
+        *warnings,
+        *(
+            f"{each.place}: {odd.what}"
+            for each in recordings
+            for odd in oddities(each)
+            if odd.kind in ("one action", "still action")
+        ),
+    ]
 
 
 def _tell_learned(document: dict[str, Any]) -> None:

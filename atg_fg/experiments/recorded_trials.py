@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
@@ -15,6 +16,7 @@ from atg_fg.core.statistics import wilson_interval
 from atg_fg.engines import begin_trial
 from atg_fg.experiments.scores import Score
 from atg_fg.experiments.trial import can_be_learned, learn_from, learn_steps
+from atg_fg.learning.predictive_checks import WORSE_THAN_CHANCE
 
 
 class Recognised(NamedTuple):
@@ -172,6 +174,25 @@ def names_by_majority(found: Sequence[Recognised], made_from: dict[str, object])
         if each.record.matched is not None:
             votes.setdefault(each.record.matched, Counter())[each.trial.object] += 1
     return {**{name: counts.most_common(1)[0][0] for name, counts in votes.items()}, **made_from}
+
+
+def improbable_trials(found: Sequence[Recognised]) -> list[str]:
+    """Return a warning for each trial that labels drawn at random explain far better than the model does.
+
+    Trials with likelihoods in place of labels are left out: their scale is the detector's own.
+    """
+    warnings = []
+    for each in found:
+        record = each.record
+        n_labels = sum(symbol is not None for detection in record.detections for symbol in detection)
+        at_random = -n_labels * math.log(record.assumptions.alphabet.n_symbols)
+        soft = any(step.truth.get("likelihoods") for step in record.steps)
+        if not soft and record.steps[-1].log_evidence < at_random - WORSE_THAN_CHANCE:
+            warnings.append(
+                f"trial {each.trial.name} is less probable than labels drawn at random: something else was shown or "
+                "done (actions), or the detector erred more than usual (noise)"
+            )
+    return warnings
 
 
 def trial_document(each: Recognised) -> dict[str, Any]:

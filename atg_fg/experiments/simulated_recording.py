@@ -15,12 +15,12 @@ from atg_fg.worlds.registry import assumptions_of, make_world_with, sense_of
 
 
 def simulated_recording(
-    name: str, n_objects: int, n_trials: int, n_actions: int, seed: int, **options: Any
+    name: str, n_objects: int, n_trials: int, n_actions: int, seed: int, objects_seed: int | None = None, **options: Any
 ) -> Recording:
     """Return trials in a world, with objects, beginnings and actions drawn at random.
 
-    The objects are drawn by the first child of ``SeedSequence(seed)``, each trial has one of the others, as in the
-    tests of ``run_test``.
+    The objects are drawn by the first child of a ``SeedSequence``, each trial has one of the others, as in the tests of
+    ``run_test``.
 
     Args:
         name: Of the world.
@@ -28,13 +28,15 @@ def simulated_recording(
         n_trials: How many.
         n_actions: Of each trial, at most.
         seed: Of all that is drawn.
+        objects_seed: Of the objects, if they are to be those of another recording.
         options: Of the world's own.
 
     Raises:
         InvalidInputError: The world cannot be made, or shows no symbols.
     """
-    objects_seed, *trial_seeds = np.random.SeedSequence(seed).spawn(1 + n_trials)
-    drawn = int(np.random.default_rng(objects_seed).integers(2**31))
+    _, *trial_seeds = np.random.SeedSequence(seed).spawn(1 + n_trials)
+    (of_objects,) = np.random.SeedSequence(seed if objects_seed is None else objects_seed).spawn(1)
+    drawn = int(np.random.default_rng(of_objects).integers(2**31))
     with closing(make_world_with(name, n_objects, drawn, **options)) as world:
         if sense_of(world) is not None:
             raise InvalidInputError(f"world {name!r}: shows pictures; expected a world that shows symbols")

@@ -110,7 +110,7 @@ def check_recording(path: Path | str, spec: RecordingSpec | None = None) -> tupl
         InvalidInputError: It cannot be read at all.
     """
     recording, faults = _read(path, spec or RecordingSpec())
-    return recording, [*faults, *_oddities(recording)]
+    return recording, [*faults, *oddities(recording)]
 
 
 def completed(recording: Recording, spec: RecordingSpec) -> Recording:
@@ -293,7 +293,7 @@ def _trial_line(trial: RecordedTrial) -> dict[str, Any]:
     )
 
 
-def _oddities(recording: Recording) -> Iterator[Fault]:
+def oddities(recording: Recording) -> Iterator[Fault]:
     """Yield what no row shows by itself: what is recorded says little, or speaks against what is assumed."""
     trials, everywhere = recording.trials, "all trials"
     used = Counter(action for trial in trials for action in trial.actions)

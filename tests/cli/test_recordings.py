@@ -1,6 +1,7 @@
 """Recordings of a user's own on the command line: looked at, learned from, recognised, shown."""
 
 import json
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -153,3 +154,14 @@ def test_a_memory_of_numbers_takes_no_labels(run, refused, folder):
 def test_more_atgs_than_objects_are_warned_of(run, folder):
     arguments = ("learn", "first.csv", "--memory", "m.json", "--teach", "--objects", "2", "--preset", "default")
     assert any("3 ATGs, but n_objects is 2" in warning for warning in document(run, *arguments)["warnings"])
+
+
+def test_an_action_that_never_changes_anything_is_warned_of(run, folder):
+    rows = [row.split(",") for row in (folder / "first.csv").read_text().splitlines()]
+    for before, after in pairwise(rows):
+        if before[2] == "tip":
+            after[3] = before[3]
+    (folder / "still.csv").write_text("\n".join(map(",".join, rows)) + "\n")
+    arguments = ("learn", "still.csv", "--memory", "m.json", "--teach", "--objects", "3", "--preset", "default")
+    (warning,) = document(run, *arguments)["warnings"]
+    assert warning == "still.csv: 'tip' never changes what is seen; expected it to, at times"

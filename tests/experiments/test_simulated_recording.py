@@ -37,6 +37,15 @@ def test_the_same_seed_gives_the_same_file(tmp_path):
         assert (read.name, read.actions, read.object) == (trial.name, trial.actions, trial.object)
 
 
+def test_a_later_recording_can_be_of_the_same_objects():
+    def shown(recording):
+        return {(trial.object, look.labels) for trial in recording.trials for look in trial.looks}
+
+    first = shown(simulated_recording("detector", 3, 60, 8, seed=1))
+    assert shown(simulated_recording("detector", 3, 20, 8, seed=2, objects_seed=1)) <= first
+    assert not shown(simulated_recording("detector", 3, 20, 8, seed=2)) <= first
+
+
 def test_worlds_of_tags_are_recorded_too():
     recording = simulated_recording("ideal", 3, 2, 4, seed=0)
     assert recording.slots == ("front", "top")
