@@ -3,7 +3,7 @@
 Run with ``python benchmarks/sampled_trials.py [TRIALS]``. Cubes with 10 % wrong looks and 10 % of symbols missing, 10
 actions by the entropy policy, seed 0: each trial with all that is learned from it. Medians over the 25 trials up to
 each number. ``python benchmarks/sampled_trials.py sweep`` tells how long one sweep takes compiled, and with the
-environment variable ``NUMBA_DISABLE_JIT=1``, how long in plain Python.
+environment variable ``NUMBA_DISABLE_JIT=1``, how long in plain Python. Seconds are of the processor.
 """
 
 from __future__ import annotations
@@ -31,11 +31,11 @@ def seconds_a_trial(name: str, n_trials: int) -> tuple[list[float], list[int]]:
     """Return how long each trial took, and how many objects the robot knew when it began."""
     taken: list[float] = []
     known: list[int] = []
-    last = time.perf_counter()
+    last = time.process_time()
 
     def on_trial(number: int, record: TrialRecord) -> None:
         nonlocal last
-        now = time.perf_counter()
+        now = time.process_time()
         taken.append(now - last)
         known.append(len(record.names))
         last = now
@@ -58,9 +58,9 @@ def seconds_a_sweep(n_trials: int = 12, n_sweeps: int = 20) -> float:
     chain.sweep(task, rng, automaton=True)
     taken = []
     for _ in range(n_sweeps):
-        begin = time.perf_counter()
+        begin = time.process_time()
         chain.sweep(task, rng, automaton=True)
-        taken.append(time.perf_counter() - begin)
+        taken.append(time.process_time() - begin)
     return float(np.median(taken))
 
 
@@ -71,7 +71,7 @@ def main() -> None:
         return
     n_trials = int(sys.argv[1]) if len(sys.argv) > 1 else 300
     run_test(TestPlan(engine=ENGINES["learned"], parameters=preset("learned"), n_trials=12, world_options=NOISE), 1)
-    table = Table(title="seconds a trial, learning included (median)", title_justify="left")
+    table = Table(title="processor seconds a trial, learning included (median)", title_justify="left")
     headings = ("trials", *(f"{name}: {what}" for name in ENGINES for what in ("objects", "s")), "ratio")
     for heading in headings:
         table.add_column(heading, justify="right")

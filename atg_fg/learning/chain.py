@@ -28,6 +28,8 @@ RECURRING: Final = 0.4
 ALL_TRIALS: Final = 200
 OTHER_TRIALS: Final = 50
 TOUCHED: Final = 1e-3
+#: Trials, drawn at random, whose slips are toggled in one sweep.
+TOGGLED_TRIALS: Final = 40
 
 
 class Structure(NamedTuple):
@@ -308,7 +310,7 @@ class Chain:
         log_odds = float(np.log(self.slip) - np.log1p(-self.slip))
         order = self._order(rng)
         if thorough:
-            for trial in order[:-1].tolist():
+            for trial in order[:-1][:TOGGLED_TRIALS].tolist():
                 slip_kernels.slip_moves(trials, trial, self.clusters, done[trial], log_odds, task.log_new, 1, rng)
         votes = np.zeros(len(self.clusters.n_trials) + 1)
         last = int(order[-1])
