@@ -20,8 +20,8 @@ setup: $(READY)  ## Install into .venv what users and developers need
 $(VENV)/.ready-demo: pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -c "$$needs_of_demo" > $(VENV)/demo.txt
-	$(BIN)/python -m pip install --quiet --no-deps --editable .
 	$(BIN)/python -m pip install --quiet --requirement $(VENV)/demo.txt
+	$(BIN)/python -m pip install --quiet --no-deps --editable .
 	$(without_samples)
 	touch $@
 
