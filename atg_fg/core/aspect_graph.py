@@ -124,7 +124,7 @@ class AspectTransitionGraph:
     def _check_action(self, action: int) -> None:
         whole_number(action, f"{self.name}: action", 0, len(self.assumptions.actions) - 1)
 
-    def learn(self, patterns: Sequence[int | None], actions: Sequence[int]) -> None:
+    def learn(self, patterns: Sequence[int | None], actions: Sequence[int | None]) -> None:
         """Extend the graph by what a trial showed.
 
         A node for each newly seen complete pattern, and one more count for each transition between two
@@ -132,7 +132,7 @@ class AspectTransitionGraph:
 
         Args:
             patterns: Index of the pattern seen at each time, ``None`` where it was not complete, length t + 1.
-            actions: Index of the action between each two, length t.
+            actions: Index of the action between each two, ``None`` where it is not sure, length t.
         """
         if len(patterns) != len(actions) + 1:
             raise InvalidInputError(
@@ -142,10 +142,11 @@ class AspectTransitionGraph:
             if pattern is not None:
                 whole_number(pattern, f"{self.name}: pattern", 0, len(self.assumptions.alphabet) - 1)
         for action in actions:
-            self._check_action(action)
+            if action is not None:
+                self._check_action(action)
         aspects = [self._aspect_for(pattern) for pattern in patterns]
         for source, action, target in zip(aspects, actions, aspects[1:], strict=False):
-            if source is not None and target is not None:
+            if source is not None and action is not None and target is not None:
                 self.add_transition(source, action, target)
 
     def absorb(self, other: AspectTransitionGraph) -> None:

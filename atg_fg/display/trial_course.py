@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from atg_fg.core.actions import AnyAction, told
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.errors import InvalidInputError
@@ -33,13 +34,13 @@ class TrialCourse(NamedTuple):
     names: tuple[str, ...]
     beliefs: list[IdentityBelief]
     patterns: list[int | None]
-    actions: list[int]
+    actions: list[AnyAction]
     expected: list[Mapping[str, float]]
 
     @property
     def chosen(self) -> list[str]:
         """Name of each action that a look followed."""
-        return [self.assumptions.actions[action] for action in self.actions]
+        return [told(action, self.assumptions) for action in self.actions]
 
 
 def course_of(trial: TrialRecord | Inference) -> TrialCourse:
@@ -60,7 +61,7 @@ def _of_record(record: TrialRecord) -> TrialCourse:
     steps, assumptions = record.steps, record.assumptions
     # The last action of a trial in which the object was lost has no look after it.
     followed = steps[:-1]
-    actions = [step.action for step in followed if step.action is not None]
+    actions: list[AnyAction] = [step.action for step in followed if step.action is not None]
     expected = [_by_name(assumptions, step.expected_entropies) for step in followed]
     return TrialCourse(assumptions, record.names, [step.belief for step in steps], record.patterns, actions, expected)
 

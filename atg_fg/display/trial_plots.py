@@ -38,7 +38,7 @@ def plot_atg(shown: AspectTransitionGraph | TrialRecord | Inference, **options: 
         return draw_atg(shown, **options)
     course = course_of(shown)
     graph = AspectTransitionGraph("what the trial showed", course.assumptions)
-    graph.learn(course.patterns, course.actions)
+    graph.learn(course.patterns, [action if isinstance(action, int) else None for action in course.actions])
     last = course.patterns[-1]
     highlight = None if last is None else graph.aspect_showing(last)
     return draw_atg(graph, **{"highlight": highlight, **options})

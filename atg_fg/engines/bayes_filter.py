@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, ClassVar
 
+from atg_fg.core.actions import AnyAction
 from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.patterns import Evidence, FloatArray
 from atg_fg.engines.filtering import FilterInference, FilterState
@@ -67,7 +68,7 @@ class BayesFilter(FilterInference):
         if self.parameters.learn_in_trial and pattern is not None:
             self._compiled.learn(previous, action, pattern)
 
-    def _act(self, action: int) -> None:
+    def _act(self, action: AnyAction) -> None:
         if self._compiled is None:
             super()._act(action)
         else:

@@ -6,6 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from atg_fg.core.actions import AnyAction
 from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.errors import TooLargeError
 from atg_fg.core.patterns import Evidence, FloatArray
@@ -60,10 +61,10 @@ class Enumeration(Inference):
             revelation.move(weights)
             self.weights = np.moveaxis(weights, -2, 0)
 
-    def _act(self, action: int) -> None:
+    def _act(self, action: AnyAction) -> None:
         self.weights = self._extended(self.weights, action)
 
-    def _extended(self, weights: FloatArray, action: int) -> FloatArray:
+    def _extended(self, weights: FloatArray, action: AnyAction) -> FloatArray:
         """Every explanation followed by every next aspect, shape [H, W_0, …, W_t, W_t+1]."""
         if weights.size * self.model.n_states > MAX_EXPLANATIONS or weights.ndim == MAX_AXES:
             raise TooLargeError(

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from atg_fg.core.actions import AnyAction, mixed
 from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.log_math import log_of
 from atg_fg.core.patterns import Evidence, FloatArray
@@ -76,8 +77,10 @@ class FilterInference(Inference):
         self._state = FilterState(log_joint - log_probability, aspects)
         self._log_evidence += log_probability
 
-    def _act(self, action: int) -> None:
-        self._state = FilterState(self._state.log_identity, self._propagate(self._state.aspects, action))
+    def _act(self, action: AnyAction) -> None:
+        before = self._state.aspects
+        aspects = mixed(action, lambda index: self._propagate(before, index), before)
+        self._state = FilterState(self._state.log_identity, aspects)
 
     @abstractmethod
     def _propagate(self, aspects: FloatArray, action: int) -> FloatArray:

@@ -12,6 +12,7 @@ from typing import ClassVar, Final
 
 import numpy as np
 
+from atg_fg.core.actions import AnyAction, UncertainAction
 from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.log_math import log_of, log_sum_exp
 from atg_fg.core.memory import RobotMemory
@@ -85,7 +86,7 @@ class LearnedStructure(BayesFilter):
             least = self.log_evidence - self._log_scale + np.log(RULED_OUT)
             self._followed = [each for each in self._followed if log_sum_exp(each.log_joint) > least]
 
-    def _act(self, action: int) -> None:
+    def _act(self, action: AnyAction) -> None:
         super()._act(action)
         for each in self._followed:
             each.filter.act(action)
@@ -111,9 +112,12 @@ class LearnedStructure(BayesFilter):
         """
         looks, memory = self.history.evidence, self.memory
         chains = [position for position, each in enumerate(self._followed) if isinstance(each, FollowedChain)]
+        actions = [action for action in self.history.actions if not isinstance(action, UncertainAction)]
         if not chains or not isinstance(memory, StructuredMemory) or self.prior is not None:
             return self.identity()
-        verdict = memory.evidence.conclude(RawTrial.of(looks, self.history.actions, memory.assumptions.alphabet))
+        if len(actions) < len(self.history.actions):
+            return self.identity()  # a raw trial has sure actions alone
+        verdict = memory.evidence.conclude(RawTrial.of(looks, actions, memory.assumptions.alphabet))
         beliefs = self._type_beliefs()
         erring = sum(float(beliefs[1 + position].sum()) for position in chains)
         total = sum(beliefs[1:], beliefs[0]) - sum(

@@ -15,6 +15,7 @@ from typing import ClassVar, NamedTuple
 
 import numpy as np
 
+from atg_fg.core.actions import AnyAction
 from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.checks import number, whole_number
 from atg_fg.core.log_math import log_sum_exp, x_log_x
@@ -117,7 +118,7 @@ class MeanField(SupportedInference):
             revelation.move(mass)
             self.aspects = mass.sum(axis=0)
 
-    def _act(self, action: int) -> None:
+    def _act(self, action: AnyAction) -> None:
         self._predicted = self.objects[:, None] * (self.aspects @ self._predict_support(action))
 
 

@@ -6,6 +6,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from atg_fg.core.actions import AnyAction
 from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.checks import whole_number
 from atg_fg.core.log_math import log_of, log_sum_exp
@@ -130,7 +131,7 @@ class ParticleFilter(SupportedInference):
         moves = (self.aspects == COLLECTION) & (chance < share[self.objects])
         self.aspects = np.where(moves, state[self.objects], self.aspects)
 
-    def _act(self, action: int) -> None:
+    def _act(self, action: AnyAction) -> None:
         self._transition = self._predict_support(action)
 
     def _draw(self, mass: FloatArray) -> None:

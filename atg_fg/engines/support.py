@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from atg_fg.core.actions import AnyAction
 from atg_fg.core.patterns import FloatArray
 from atg_fg.inference.interface import Inference, TrialSetup
 from atg_fg.inference.recognition_model import Revelation
@@ -40,7 +41,7 @@ class SupportedInference(Inference):
             self.support = mass > 0
         return revelation
 
-    def _predict_support(self, action: int) -> FloatArray:
+    def _predict_support(self, action: AnyAction) -> FloatArray:
         """Predict the support, and return p(x' | x, a, i), shape [H, W, W]."""
         transition = self.model.transition(action)
         self.support = np.matmul(self.support[:, None, :].astype(np.float64), transition)[:, 0, :] > 0

@@ -9,6 +9,7 @@ from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from atg_fg.core.actions import NOTHING, AnyAction, UncertainAction
 from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.belief import IdentityBelief
@@ -37,7 +38,7 @@ class _Case(NamedTuple):
     parameters: ModelParameters
     prior: IdentityBelief | None
     looks: list[Evidence]
-    actions: list[int]
+    actions: list[AnyAction]
 
 
 class Deviation(NamedTuple):
@@ -85,7 +86,7 @@ def check_engine(
         _require(isinstance(value, kind), f"{attribute} is {value!r}; expected a {kind.__name__}")
     worst = Deviation()
     for number in range(cases):
-        case = _drawn_case(number, np.random.default_rng((seed, number)))
+        case = _drawn_case(number, np.random.default_rng((seed, number)), sure=not found.takes_uncertain_actions)
         begin = _beginner(found, case, options)
         worst = _compared(found, begin, case, tolerance, worst)
         _check_refusals(begin(), case)
@@ -229,8 +230,11 @@ def _require(holds: bool, message: str) -> None:
         raise AssertionError(message)
 
 
-def _drawn_case(number: int, rng: np.random.Generator) -> _Case:
-    """Return a model of one slot or two with up to four objects, and a trial of three looks."""
+def _drawn_case(number: int, rng: np.random.Generator, *, sure: bool) -> _Case:
+    """Return a model of one slot or two with up to four objects, and a trial of three looks.
+
+    In some trials looks follow each other without an action, or it is not sure what was done, unless ``sure``.
+    """
     parameters = _PARAMETERS[number % len(_PARAMETERS)]
     slots = ("front", "top")[: int(rng.integers(1, 3))]
     alphabet = PatternAlphabet(slots, int(rng.integers(2, 5)))
@@ -242,7 +246,7 @@ def _drawn_case(number: int, rng: np.random.Generator) -> _Case:
     if number % 3 == 2:
         weights = rng.dirichlet(np.ones(len(graphs) + 1))
         prior = IdentityBelief.of(weights, assumptions.n_objects - len(graphs))
-    looks, actions = _drawn_trial(memory, parameters, rng)
+    looks, actions = _drawn_trial(memory, parameters, rng, sure=sure)
     return _Case(number, memory, parameters, prior, looks, actions)
 
 
@@ -258,11 +262,11 @@ def _drawn_graph(name: str, assumptions: Assumptions, rng: np.random.Generator) 
 
 
 def _drawn_trial(
-    memory: RobotMemory, parameters: ModelParameters, rng: np.random.Generator
-) -> tuple[list[Evidence], list[int]]:
+    memory: RobotMemory, parameters: ModelParameters, rng: np.random.Generator, *, sure: bool
+) -> tuple[list[Evidence], list[AnyAction]]:
     """Return looks that are possible, whole, in part or soft, with random actions between them."""
     n_patterns, looks = len(memory.assumptions.alphabet), 3
-    actions = rng.integers(len(memory.assumptions.actions), size=looks - 1).tolist()
+    actions = [_drawn_action(memory.assumptions, rng, sure=sure) for _ in range(looks - 1)]
     guide, evidence = begin_trial("enumeration", memory, parameters), []
     for look in range(looks):
         likelihood = np.zeros(n_patterns)
@@ -283,3 +287,13 @@ def _drawn_trial(
         if look < len(actions):
             guide.act(actions[look])
     return evidence, actions
+
+
+def _drawn_action(assumptions: Assumptions, rng: np.random.Generator, *, sure: bool) -> AnyAction:
+    index, kind = int(rng.integers(len(assumptions.actions))), rng.integers(4)
+    if kind == 2:
+        return NOTHING
+    if kind == 3 and not sure:
+        shares = rng.dirichlet(np.ones(len(assumptions.actions) + 1)).tolist()
+        return UncertainAction(tuple(enumerate(shares[:-1])), shares[-1])
+    return index

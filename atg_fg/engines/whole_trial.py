@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from atg_fg.core.actions import AnyAction
 from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.patterns import Evidence, FloatArray, protect
 from atg_fg.engines.support import SupportedInference
@@ -71,7 +72,7 @@ class WholeTrialInference(SupportedInference):
         self._learn()
         self._posterior = None
 
-    def _act(self, action: int) -> None:
+    def _act(self, action: AnyAction) -> None:
         self._predict_support(action)
         self._posterior = None
 

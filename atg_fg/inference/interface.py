@@ -10,8 +10,10 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
+from atg_fg.core.actions import NOTHING, AnyAction, GivenAction, action_from
 from atg_fg.core.belief import SHOWN, BeliefTable, IdentityBelief
 from atg_fg.core.errors import ImpossibleEvidenceError, InvalidInputError
+from atg_fg.core.looks import Look, evidence_of, strength
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, FloatArray, protect
@@ -61,6 +63,8 @@ class Inference(ABC):
     name: ClassVar[str]
     exact: ClassVar[bool]
     knows_structure: ClassVar[bool] = False
+    #: Whether ``act`` takes what is only probable.
+    takes_uncertain_actions: ClassVar[bool] = True
     #: The engine's own options that ``begin_trial`` was given.
     options: Mapping[str, Any] = MappingProxyType({})
 
@@ -84,16 +88,56 @@ class Inference(ABC):
         vars(self).update(state)
         self._protect()
 
-    def observe(self, evidence: Evidence) -> None:
+    def observe(self, look: Look, *, independent: bool = True) -> None:
         """Take in the evidence z_t of a look, then learn from it if the parameters say so.
 
+        Several looks may follow each other without an action: they are of one aspect, X_t.
+
+        Args:
+            look: Evidence; the symbol in each slot, by number or name; symbols or their likelihoods by slot; or
+                ``None`` if nothing was seen.
+            independent: Whether a look without an action before it errs by itself. If not, as of frames that show the
+                same shadow, the one that says most counts alone.
+
         Raises:
-            InvalidInputError: It is an action's turn, or the evidence is not over this alphabet.
+            InvalidInputError: The look does not fit the alphabet.
             ImpossibleEvidenceError: The evidence has probability zero under the model; nothing has changed.
         """
-        if not self.history.awaits_evidence:
-            raise InvalidInputError("trial: two observations in a row; expected an action between them")
+        evidence = evidence_of(self.memory.assumptions.alphabet, look)
         evidence.check(self.model.n_patterns)
+        if self.history.awaits_evidence:
+            self._take_in(evidence)
+        elif independent:
+            self._look_again(evidence)
+        else:
+            self._keep_the_strongest(evidence)
+
+    def _look_again(self, evidence: Evidence) -> None:
+        """Take in a look at what was looked at before: nothing happened since."""
+        before = copy(self)
+        self.history.actions.append(NOTHING)
+        try:
+            self._act(NOTHING)
+            self._take_in(evidence)
+        except BaseException:
+            vars(self).update(vars(before))
+            raise
+
+    def _keep_the_strongest(self, evidence: Evidence) -> None:
+        """Let a look count in place of those at rest if it says more; they are taken back by beginning again."""
+        rest = self.history.looks_at_rest()
+        if max(strength(self.history.evidence[time]) for time in rest) >= strength(evidence):
+            return
+        again = type(self)(TrialSetup(self.memory, self.parameters, self.prior), **self.options)
+        again.options = self.options
+        for time, look in enumerate([*self.history.evidence[: rest[0]], evidence]):
+            if time:
+                again._do(self.history.actions[time - 1])
+            again._take_in(look)
+        vars(self).clear()
+        vars(self).update(vars(again))
+
+    def _take_in(self, evidence: Evidence) -> None:
         evidence, log_scale = evidence.scaled()
         self.history.evidence.append(evidence)
         try:
@@ -104,18 +148,25 @@ class Inference(ABC):
         self._log_scale += log_scale
         self._protect()
 
-    def act(self, action: int | str) -> None:
-        """Predict the effect of an action a_{t+1}, its index or its name.
+    def act(self, action: GivenAction) -> None:
+        """Predict the effect of an action a_{t+1}.
+
+        Args:
+            action: Its index or its name; ``None`` if nothing happened; or the probability of each of these, if it is
+                not sure what was done.
 
         Raises:
-            InvalidInputError: It is an observation's turn, or there is no such action.
+            InvalidInputError: It is an observation's turn, there is no such action, or the probabilities do not sum to
+                one.
         """
         if self.history.awaits_evidence:
             raise InvalidInputError("trial: an action without an observation before it; expected an observation")
-        index = self.memory.assumptions.action_of(action)
-        self.history.actions.append(index)
+        self._do(action_from(action, self.memory.assumptions))
+
+    def _do(self, action: AnyAction) -> None:
+        self.history.actions.append(action)
         try:
-            self._act(index)
+            self._act(action)
         except BaseException:
             self.history.actions.pop()
             raise
@@ -265,8 +316,11 @@ class Inference(ABC):
         """
 
     @abstractmethod
-    def _act(self, action: int) -> None:
-        """Predict the effect of an action, the last of ``history``; if this raises, nothing has changed."""
+    def _act(self, action: AnyAction) -> None:
+        """Predict the effect of an action, the last of ``history``; if this raises, nothing has changed.
+
+        ``mixed`` (``atg_fg.core.actions``) makes a prediction for a sure action one for an action that is not.
+        """
 
     def _expected_entropies(self) -> FloatArray:
         """Return E[H(O | z_{t+1}, a, …)] of each action (eq. 3) in nats, shape [A]; called after a look.

@@ -29,6 +29,7 @@ from typing import Any, NamedTuple, TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from atg_fg.core.actions import AnyAction, UncertainAction, mixed
 from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.compact.columns import positions
@@ -168,8 +169,10 @@ class RecognitionModel:
         self.n_unreached = (self.n_known - n_targets).astype(np.float64)
         protect(vars(self).values())
 
-    def transition(self, action: int) -> FloatArray:
+    def transition(self, action: AnyAction) -> FloatArray:
         """Return p(x' | x, a, i) with its padding, shape [H, W, W]; see ``docs/model.md``."""
+        if isinstance(action, UncertainAction):
+            return mixed(action, self.transition, np.tile(np.eye(self.n_states), (self.n_hypotheses, 1, 1)))
         table: FloatArray = self.prior_weight[action][:, :, None] * self.base_row[:, None, :]
         chosen = self.edges.action == action
         where = (self.edges.hypothesis[chosen], self.edges.source[chosen], self.edges.target[chosen])

@@ -7,6 +7,7 @@ from typing import Final
 
 import numpy as np
 
+from atg_fg.core.actions import AnyAction, UncertainAction, mixed
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import FloatArray
@@ -98,10 +99,18 @@ class CompiledFilter:
         self._next_aspects = np.zeros_like(self._aspects)
         self._terms = None
 
-    def act(self, action: int) -> None:
+    def act(self, action: AnyAction) -> None:
         """Predict the effect of an action."""
+        if isinstance(action, UncertainAction):
+            # Not a copy of one's own: padding behind the aspects is to stay as it is.
+            self._aspects[...] = mixed(action, lambda index: self._moved(index).copy(), self._aspects)
+            return
+        moved = self._moved(action)
+        self._aspects, self._next_aspects = moved, self._aspects
+
+    def _moved(self, action: int) -> FloatArray:
         kernels.predict(self._tables, self._constants, self._aspects, action, self._next_aspects)
-        self._aspects, self._next_aspects = self._next_aspects, self._aspects
+        return self._next_aspects
 
     def expected_entropies(self, n_unseen: int) -> FloatArray:
         """Return eq. 3 for each action in nats, shape [A]."""

@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 
+from atg_fg.core.actions import AnyAction, UncertainAction
 from atg_fg.core.log_math import log_sum_exp
 from atg_fg.core.patterns import Evidence, FloatArray, IntArray, PatternAlphabet
 from atg_fg.learning.detector_noise import MOST_CERTAIN, DetectorNoise
@@ -62,8 +63,14 @@ class PathFilter:
         result: FloatArray = peak + np.log(np.exp(logarithms - peak).sum(axis=0))
         return result
 
-    def act(self, action: int) -> None:
-        """Take in an action: each path goes on, and leaves another behind for a slip."""
+    def act(self, action: AnyAction) -> None:
+        """Take in an action: each path goes on, and leaves another behind for a slip.
+
+        Where it is not sure what was done, each path goes on in all ways that are possible.
+        """
+        if isinstance(action, UncertainAction):
+            self._act_uncertainly(action)
+            return
         states, slip = self._states, self._chain.slip
         moved = np.concatenate((states, self._chain.successors[action, states[:, -1]][:, None]), axis=1)
         stayed = np.concatenate((states, states[:, -1:]), axis=1)
@@ -75,6 +82,18 @@ class PathFilter:
         self._states = np.concatenate((moved, stayed[differs]))
         self._local = np.concatenate((self._local, self._local[differs]))
         self._factors = np.concatenate((self._factors, self._factors[differs]))
+
+    def _act_uncertainly(self, action: UncertainAction) -> None:
+        """Let each path go on by each action that may have been done, each with its slip, and stay if it may."""
+        before, slip = self._states, self._chain.slip
+        ways = [
+            (self._chain.successors[index, before[:, -1]], chance * (1.0 - slip)) for index, chance in action.chances
+        ]
+        ways.append((before[:, -1], action.stays + slip * sum(chance for _, chance in action.chances)))
+        ways = [(end, chance) for end, chance in ways if chance > 0]
+        self._states = np.concatenate([np.concatenate((before, end[:, None]), axis=1) for end, _ in ways])
+        self._log_prior = np.concatenate([self._log_prior + np.log(chance) for _, chance in ways])
+        self._local, self._factors = (np.concatenate([each] * len(ways)) for each in (self._local, self._factors))
 
     def observe(self, evidence: Evidence) -> None:
         """Take in a look, as labels if it is a detection, else as a likelihood of each slot's symbol."""

@@ -12,6 +12,7 @@ from typing import Final
 
 import numpy as np
 
+from atg_fg.core.actions import mixed
 from atg_fg.core.errors import InvalidInputError, TooLargeError
 from atg_fg.core.patterns import Evidence, FloatArray, PatternAlphabet
 from atg_fg.inference.chain import Chain, forward_pass
@@ -65,7 +66,10 @@ def pose_chain(
     return Chain(
         prior,
         np.full((n_objects, n_poses), 1.0 / n_poses),
-        tuple(np.broadcast_to(turns[action], (n_objects, n_poses, n_poses)) for action in history.actions),
+        tuple(
+            np.broadcast_to(mixed(action, turns.__getitem__, np.eye(n_poses)), (n_objects, n_poses, n_poses))
+            for action in history.actions
+        ),
         tuple(
             (1.0 - rates.wrong) * (shown @ evidence.likelihood)
             + rates.wrong / len(alphabet) * evidence.likelihood.sum()

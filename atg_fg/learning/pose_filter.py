@@ -16,6 +16,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from atg_fg.core.actions import AnyAction, UncertainAction
 from atg_fg.core.log_math import log_sum_exp
 from atg_fg.core.patterns import FloatArray, IntArray, PatternAlphabet
 from atg_fg.learning.rates import Rates
@@ -130,9 +131,23 @@ class PoseFilter:
         twin.log_evidence = self.log_evidence.copy()
         return twin
 
-    def act(self, action: int) -> None:
+    def act(self, action: AnyAction) -> None:
         """Take in an action."""
+        if isinstance(action, UncertainAction):
+            self._act_uncertainly(action)
+            return
         self.act_apart(np.full(len(self.log_evidence), action))
+
+    def _act_uncertainly(self, action: UncertainAction) -> None:
+        """Take in each action that may have been done, and that nothing happened, as far as they are probable."""
+        before, rows = self.rows, []
+        if action.stays > 0:
+            rows.append(before._replace(weight=before.weight * action.stays))
+        for index, chance in action.chances:
+            self.rows = before._replace(weight=before.weight * chance)
+            self.act(index)
+            rows.append(self.rows)
+        self.rows = Rows(*(np.concatenate(columns) for columns in zip(*rows, strict=True)))
 
     def act_apart(self, actions: IntArray) -> None:
         """Take in an action of each owner, shape [H]."""

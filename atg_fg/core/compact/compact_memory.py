@@ -153,13 +153,17 @@ class CompactMemory(RobotMemory):
             index.add(pattern, number, aspect)
 
     def learn(
-        self, patterns: Sequence[int | None], actions: Sequence[int], matched: str | None, name: str | None = None
+        self,
+        patterns: Sequence[int | None],
+        actions: Sequence[int | None],
+        matched: str | None,
+        name: str | None = None,
     ) -> str:
         """Learn from a trial and return the name of the ATG it went to.
 
         Args:
             patterns: Index of the pattern seen at each time, ``None`` where it was not complete, length t + 1.
-            actions: Index of the action between each two, length t.
+            actions: Index of the action between each two, ``None`` where it is not sure, length t.
             matched: Name of the ATG to extend, or ``None`` if the object was judged novel.
             name: Of the ATG of a novel object; the next number if not given.
         """

@@ -12,6 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from atg_fg.core.actions import AnyAction, UncertainAction
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.compact.columns import positions
 from atg_fg.core.compact.compact_memory import GraphArrays
@@ -162,8 +163,10 @@ class AspectFilter:
         carried = mass.ravel()[edges.source] * edges.probability
         return np.bincount(edges.target, carried, mass.size).astype(np.float64).reshape(mass.shape)
 
-    def predict(self, action: int) -> None:
-        """Take in an action."""
+    def predict(self, action: AnyAction) -> None:
+        """Take in an action that is sure, or that nothing happened."""
+        if isinstance(action, UncertainAction):
+            return
         kept = np.einsum("rw,rw->r", self.mass, self.prior_weight[action]) + self.hidden.prior_weight * self.hidden_mass
         predicted = self.arrivals(action, self.mass)
         np.add(predicted, (kept / self.n_aspects)[:, None], out=predicted, where=self.pattern >= 0)

@@ -6,9 +6,11 @@ from typing import ClassVar, Final, NamedTuple
 
 import numpy as np
 
+from atg_fg.core.actions import AnyAction, UncertainAction
 from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.checks import whole_number
 from atg_fg.core.compact.compact_memory import CompactMemory, GraphArrays
+from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.log_math import log_of, log_sum_exp
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.patterns import Evidence, FloatArray, IntArray
@@ -57,6 +59,7 @@ class LargeMemory(Inference):
 
     name: ClassVar[str] = "large-memory"
     exact: ClassVar[bool] = False
+    takes_uncertain_actions: ClassVar[bool] = False
 
     def __init__(
         self,
@@ -145,7 +148,11 @@ class LargeMemory(Inference):
         first: IntArray = objects[~self._is_matched[objects]]
         return first
 
-    def _act(self, action: int) -> None:
+    def _act(self, action: AnyAction) -> None:
+        if isinstance(action, UncertainAction):
+            if action.chances:
+                raise InvalidInputError("engine 'large-memory': an action that is not sure; expected one that is")
+            return  # nothing happened
         for each in self._filters():
             each.predict(action)
 

@@ -1,0 +1,133 @@
+"""Several looks without an action, and actions that are not sure: exact in every exact engine, and in the graph."""
+
+import numpy as np
+import pytest
+
+from atg_fg.core.errors import ImpossibleEvidenceError, InvalidInputError
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.patterns import Evidence
+from atg_fg.engines import ENGINES, begin_trial
+from tests.small import EXACT_ENGINES, graph, one_slot
+
+ASSUMPTIONS = one_slot(3, 3, 4, ("turn", "tip"))
+MEMORY = RobotMemory(
+    ASSUMPTIONS,
+    [
+        graph(ASSUMPTIONS, "a", [(0,), (1,), (2,)], (0, 0, 1, 3), (1, 1, 2, 2), (2, 0, 0, 1)),
+        graph(ASSUMPTIONS, "b", [(0,), (2,)], (0, 0, 1, 2), (1, 1, 0, 1)),
+    ],
+)
+FIXED = ModelParameters(0.3, 0.1, learn_in_trial=False)
+
+
+def soft(*weights):
+    return Evidence.of_likelihood(ASSUMPTIONS.alphabet, weights)
+
+
+@pytest.mark.parametrize("engine", EXACT_ENGINES)
+def test_looks_at_rest_are_independent_evidence_of_one_aspect(engine):
+    # Two soft looks at one aspect: p(z, z' | x) = p(z | x) p(z' | x), summed by hand over objects and aspects.
+    first, second = np.array([0.7, 0.1, 0.1, 0.1]), np.array([0.2, 0.2, 0.5, 0.1])
+    trial = begin_trial(engine, MEMORY, FIXED)
+    trial.observe(soft(*first))
+    trial.observe(soft(*second))
+    delta, joint = 0.1, []
+    for known, unknown in (((0, 1, 2), 0), ((0, 2), 1), ((), 3)):
+        lacking = [z for z in range(4) if z not in known]
+        total = 0.0
+        for z in known:
+            both = [(1 - delta) * look[z] + delta / 4 * look.sum() for look in (first, second)]
+            total += both[0] * both[1] / 3
+        both = [(1 - delta) * look[lacking].mean() + delta / 4 * look.sum() for look in (first, second)]
+        joint.append(total + unknown / 3 * both[0] * both[1])
+    expected = np.array(joint) / sum(joint)
+    belief = trial.identity()
+    np.testing.assert_allclose([*belief.objects, belief.unseen], expected, atol=1e-12)
+    assert trial.log_evidence == pytest.approx(np.log(sum(joint) / 3), abs=1e-12)
+
+
+@pytest.mark.parametrize("engine", EXACT_ENGINES)
+@pytest.mark.parametrize("learns", [False, True])
+def test_an_uncertain_action_is_the_mixture_of_trials(engine, learns):
+    parameters = ModelParameters(0.3, 0.1, learn_in_trial=learns)
+    looks = (0, 2)
+
+    def weights(action):
+        trial = begin_trial("enumeration", MEMORY, ModelParameters(0.3, 0.1, learn_in_trial=False))
+        trial.observe((looks[0],))
+        trial.act(action)
+        trial.observe((looks[1],))
+        belief = trial.identity()
+        return np.exp(trial.log_evidence) * np.array([*belief.objects, belief.unseen])
+
+    expected = 0.5 * weights("turn") + 0.3 * weights("tip") + 0.2 * weights(None)
+    trial = begin_trial(engine, MEMORY, parameters)
+    trial.observe((looks[0],))
+    trial.act({"turn": 0.5, "tip": 0.3, None: 0.2})
+    trial.observe((looks[1],))
+    belief = trial.identity()
+    if not learns:
+        np.testing.assert_allclose([*belief.objects, belief.unseen], expected / expected.sum(), atol=1e-12)
+        assert trial.log_evidence == pytest.approx(np.log(expected.sum()), abs=1e-12)
+    assert len(trial.smoothed_aspects(0)) == 2
+
+
+def test_the_graph_has_them_as_factors():
+    trial = begin_trial("gtsam", MEMORY, ModelParameters(0.3, 0.1))
+    trial.observe((0,))
+    trial.observe({"front": {1: 0.5, 0: 0.5}})
+    trial.act({"turn": 0.9, None: 0.1})
+    trial.observe((1,))
+    belief = trial.identity()
+    np.testing.assert_allclose(trial.graph().identity().objects, belief.objects, atol=1e-12)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_of_dependent_looks_the_strongest_counts_alone(engine):
+    alone = begin_trial(engine, MEMORY, FIXED)
+    alone.observe((0,))
+    for looks in ([None, (0,)], [(0,), None], [soft(0.7, 0.1, 0.1, 0.1), (0,), soft(0.4, 0.2, 0.2, 0.2)]):
+        trial = begin_trial(engine, MEMORY, FIXED)
+        for look in looks:
+            trial.observe(look, independent=False)
+        assert trial.identity().objects.tolist() == alone.identity().objects.tolist()
+        assert len(trial.history.evidence) == 1
+
+
+@pytest.mark.parametrize("engine", EXACT_ENGINES)
+def test_an_impossible_look_at_rest_changes_nothing(engine):
+    trial = begin_trial(engine, MEMORY, ModelParameters(0.0, 0.0, learn_in_trial=False))
+    trial.observe((0,))
+    before = trial.identity().objects.tolist()
+    with pytest.raises(ImpossibleEvidenceError):
+        trial.observe(Evidence(np.zeros(4)))
+    assert trial.identity().objects.tolist() == before
+    assert len(trial.history.evidence) == 1
+    trial.act("turn")
+    trial.observe((1,))
+
+
+def test_the_first_whole_look_at_rest_is_learned_from():
+    trial = begin_trial("bayes-filter", MEMORY, ModelParameters(0.3, 0.1, learn_in_trial=True))
+    twin = begin_trial("bayes-filter", MEMORY, ModelParameters(0.3, 0.1, learn_in_trial=True))
+    for each in (trial, twin):
+        each.observe((3,))
+    trial.observe((3,))
+    assert trial.model.n_states == twin.model.n_states
+    for each in (trial, twin):
+        each.act("turn")
+        each.observe((1,))
+    np.testing.assert_allclose(trial.identity().objects, twin.identity().objects, atol=0.05)
+    assert trial.model.n_states == twin.model.n_states
+    assert len(trial.model.edges.source) == len(twin.model.edges.source)
+
+
+def test_an_engine_that_needs_to_be_sure_says_so():
+    trial = begin_trial("large-memory", MEMORY, FIXED)
+    trial.observe((0,))
+    trial.observe((0,))
+    with pytest.raises(InvalidInputError, match="an action that is not sure; expected one that is"):
+        trial.act({"turn": 0.5, "tip": 0.5})
+    trial.act("turn")
+    trial.observe((1,))
