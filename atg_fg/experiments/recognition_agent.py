@@ -1,37 +1,78 @@
-"""The recogniser as an agent: from what a world shows to an action, in a loop of a user's own.
+"""The recogniser as an agent: from what is seen to an action, in a loop of a user's own.
 
-A loop over a world asks it as it asks a model of Stable-Baselines3, by ``predict``; its belief is its own business.
+A loop over a world asks it as it asks a model of Stable-Baselines3, by ``predict``. A robot's loop tells it what was
+seen, as often as it likes, and what was done in the end, which may be something else than was proposed.
 """
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from atg_fg.core.actions import GivenAction
 from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.looks import Look
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
-from atg_fg.core.patterns import Evidence, IntArray
+from atg_fg.core.patterns import MISSING, Evidence, IntArray
+from atg_fg.core.records import Verdict
 from atg_fg.engines import begin_trial, engine_for
+from atg_fg.experiments.learned_history import learn_history
 from atg_fg.inference.interface import Inference
 from atg_fg.policies import Policy, make_policy
 from atg_fg.worlds.base import detection_of
 
 
-class RecognitionAgent:
-    """Takes in what a world shows, keeps a belief about the object, and chooses the next action.
+class Proposal(NamedTuple):
+    """What to do next.
 
-    It works in one world, or in many at once: then observations have shape [worlds, slots], and there is a belief for
-    each.
+    Attributes:
+        action: Name of the action, ``None`` if the policy ends the trial.
+        expected_entropy: Of identity after it and its look (eq. 3), nats; ``None`` if the policy did not ask.
+        purpose: What it is for, or why the trial ends, such as ``settled``, if the policy says so.
+    """
+
+    action: str | None
+    expected_entropy: float | None = None
+    purpose: str | None = None
+
+    @property
+    def settled(self) -> bool:
+        """Whether there is nothing more to be done."""
+        return self.action is None
+
+
+class AgentVerdict(NamedTuple):
+    """What the object is taken for.
+
+    Attributes:
+        verdict: ``novel``, ``known``, or ``undecided`` if nothing at all was seen.
+        name: Of the object, if it is known.
+        probability: Of the verdict.
+    """
+
+    verdict: Verdict
+    name: str | None
+    probability: float
+
+
+class RecognitionAgent:
+    """Takes in what is seen, keeps a belief about the object, and proposes the next action.
+
+    A robot's loop calls ``observe``, ``next_action`` and ``did`` until the proposal is ``settled``, then ``verdict``
+    and, if it is to be remembered, ``learn``. A loop over worlds calls ``predict``: in one world, or in many at once;
+    then observations have shape [worlds, slots], and there is a belief for each.
 
     Args:
-        memory: The robot memory; it is not changed.
+        memory: The robot memory; only ``learn`` changes it. One that is kept in a database may be used by other
+            processes at the same time.
         parameters: α, δ and whether to learn within the trial.
         engine: Name of the inference engine.
-        policy: Chooses the actions, or its name; it must not end trials.
+        policy: Chooses the actions, or its name; it may end trials where ``next_action`` is asked.
         seed: Of the generators of all trials, from which ties are broken.
 
     Raises:
@@ -56,6 +97,7 @@ class RecognitionAgent:
         self.policy: Policy = make_policy(policy) if isinstance(policy, str) else policy
         self._seeds = np.random.SeedSequence(seed)
         self.trials: list[Inference] = []
+        self._names = memory.names
         self._generators: list[np.random.Generator] = []
 
     def reset(self) -> None:
@@ -112,19 +154,96 @@ class RecognitionAgent:
         actions = [self._act(inference, rng) for inference, rng in zip(self.trials, self._generators, strict=True)]
         return np.array(actions if rows.ndim == 2 else actions[0], dtype=np.int64), None
 
-    def observe(self, observation: ArrayLike, episode_start: ArrayLike | None = None) -> None:
-        """Take in what each world shows without acting on it: the last look of a trial.
+    def observe(
+        self, look: Look | ArrayLike, episode_start: ArrayLike | None = None, *, independent: bool = True
+    ) -> None:
+        """Take in what is seen without acting on it; several looks may follow each other.
 
         Args:
-            observation: As for ``predict``.
+            look: As for ``Inference.observe``; or what worlds show, as for ``predict``.
             episode_start: As for ``predict``.
+            independent: As for ``Inference.observe``.
 
         Raises:
-            InvalidInputError: An observation that is of another shape, or not of the alphabet.
+            InvalidInputError: A look that is of another shape, or not of the alphabet.
         """
-        self._take_in(observation, episode_start)
+        given: Any = look if isinstance(look, np.ndarray) else self._numbers_of(look)
+        if isinstance(given, np.ndarray):
+            self._take_in(given, episode_start, independent=independent)
+            return
+        if len(self.trials) > 1:
+            raise InvalidInputError(f"agent: a look of one world; expected {len(self.trials)} as before")
+        self._begin_trials(1, episode_start)
+        self.inference.observe(given, independent=independent)
 
-    def _take_in(self, observation: ArrayLike, episode_start: ArrayLike | None) -> NDArray[Any]:
+    def _numbers_of(self, look: Look | ArrayLike) -> Any:
+        """Return numbers, with ``MISSING`` among them or of many worlds, as an array; any other look as it is."""
+        if look is None or isinstance(look, (Evidence, Mapping, str)):
+            return look
+        rows = list(look)  # type: ignore[arg-type]
+        of_worlds = bool(rows) and all(isinstance(row, (list, tuple, np.ndarray)) for row in rows)
+        return np.asarray(rows) if of_worlds or MISSING in rows else look
+
+    def next_action(self) -> Proposal:
+        """Return what to do next; nothing is taken for done before ``did`` says so.
+
+        Raises:
+            InvalidInputError: Nothing was seen since the last action.
+        """
+        choice = self.policy.choose(self.inference, self._generators[0])
+        expected = choice.expected_entropies
+        if choice.action is None:
+            return Proposal(None, None, choice.purpose)
+        entropy = None if expected is None else float(expected[choice.action])
+        return Proposal(self.memory.assumptions.actions[choice.action], entropy, choice.purpose)
+
+    def did(self, action: GivenAction) -> None:
+        """Take in what was done, whatever had been proposed: see ``Inference.act``.
+
+        Raises:
+            InvalidInputError: There is no such action, or nothing was seen before it.
+        """
+        self.inference.act(action)
+
+    @property
+    def verdict(self) -> AgentVerdict:
+        """What the object is taken for, by all that was seen.
+
+        Raises:
+            InvalidInputError: Nothing has been seen since the last reset.
+        """
+        inference = self.inference
+        if all(np.ptp(look.likelihood) == 0 for look in inference.history.evidence):
+            return AgentVerdict("undecided", None, 1.0)
+        belief = inference.conclude()
+        best = belief.most_probable_object
+        if belief.is_novel or best is None:
+            return AgentVerdict("novel", None, float(belief.unseen))
+        return AgentVerdict("known", self._names[best], float(belief.objects[best]))
+
+    def learn(self, name: str | None = None) -> str | None:
+        """Let the memory learn from the trial, and be ready for the next; return the name of the object.
+
+        Args:
+            name: Of the object, if someone has said it; else it is that of the verdict, or a new one.
+
+        Returns:
+            ``None`` if there was nothing to learn: no pattern was seen whole.
+
+        Raises:
+            InvalidInputError: Nothing has been seen since the last reset.
+        """
+        verdict, trial = self.verdict, self.inference
+        matched = name if name is not None and name in self.memory.names else verdict.name if name is None else None
+        if matched is not None and matched not in self.memory.names:
+            matched = None  # another process has given its trials to other objects meanwhile
+        learned = learn_history(self.memory, trial.history, matched, name, taught=name is not None)
+        self.reset()
+        return learned
+
+    def _take_in(
+        self, observation: ArrayLike, episode_start: ArrayLike | None, *, independent: bool = True
+    ) -> NDArray[Any]:
         rows = np.asarray(observation)
         alphabet = self.memory.assumptions.alphabet
         if rows.ndim not in (1, 2) or rows.shape[-1] != len(alphabet.slots) or not rows.size:
@@ -136,12 +255,13 @@ class RecognitionAgent:
         evidence = [Evidence.of_detection(alphabet, detection) for detection in detections]
         self._begin_trials(len(evidence), episode_start)
         for inference, each in zip(self.trials, evidence, strict=True):
-            inference.observe(each)
+            inference.observe(each, independent=independent)
         return rows
 
     def _begin_trials(self, n_worlds: int, episode_start: ArrayLike | None) -> None:
         """Make an engine anew in each world where a trial begins."""
         if not self.trials:
+            self._names = self.memory.names
             self.trials = [begin_trial(self.engine, self.memory, self.parameters) for _ in range(n_worlds)]
             self._generators = [self._generator() for _ in range(n_worlds)]
             return
@@ -159,6 +279,6 @@ class RecognitionAgent:
     def _act(self, inference: Inference, rng: np.random.Generator) -> int:
         choice = self.policy.choose(inference, rng)
         if choice.action is None:
-            raise InvalidInputError("agent: the policy ends the trial; expected one that always acts")
+            raise InvalidInputError("agent: the policy ends the trial; expected one that always acts, or next_action")
         inference.act(choice.action)
         return choice.action

@@ -1,16 +1,21 @@
 """Our recogniser in loops of others."""
 
+import subprocess
+import sys
+
 import gymnasium
 import numpy as np
 import pytest
 
-from atg_fg.core.assumptions import arcube_assumptions
+from atg_fg.core.assumptions import Assumptions, arcube_assumptions
 from atg_fg.core.errors import InvalidInputError, UnknownNameError
+from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
-from atg_fg.core.patterns import MISSING
+from atg_fg.core.patterns import MISSING, PatternAlphabet
 from atg_fg.experiments.exploration import complete_memory
 from atg_fg.experiments.recognition_agent import RecognitionAgent
 from atg_fg.policies import StoppingPolicy, make_policy
+from atg_fg.storage.memory_files import open_memory
 from atg_fg.storage.presets import preset
 from atg_fg.worlds.arcube import make_arcubes
 from atg_fg.worlds.arcube_world import ARcubeWorld
@@ -153,3 +158,78 @@ def test_stable_baselines3_evaluates_it(memory):
     world = gymnasium.wrappers.TimeLimit(ARcubeWorld(CUBES), max_episode_steps=4)
     rewards, lengths = evaluation.evaluate_policy(agent, world, n_eval_episodes=3, return_episode_rewards=True)
     assert (rewards, lengths) == ([0.0] * 3, [4] * 3)
+
+
+class TestALoopOfOnesOwn:
+    """A robot that looks as often as it likes, and does what it can."""
+
+    @pytest.fixture
+    def named(self):
+        alphabet = PatternAlphabet.named(("front", "top"), [f"tag-{number}" for number in range(12)])
+        assumptions = Assumptions(10, 24, ("flip", "left", "right"), alphabet)
+        return RobotMemory(assumptions)
+
+    def test_it_looks_acts_and_learns_until_it_is_settled(self, named):
+        agent = RecognitionAgent(
+            named, ModelParameters(learn_in_trial=True), policy=StoppingPolicy(make_policy("entropy"), 1e-4)
+        )
+        names, world = [], ARcubeWorld(CUBES[:2])
+        for number, cube in enumerate([0, 1, 0, 1, 0, 1]):
+            observation, _ = world.reset(seed=number, options={"object": cube})
+            for _ in range(20):
+                agent.observe([f"tag-{symbol}" for symbol in observation])
+                agent.observe({"front": f"tag-{observation[0]}"})  # a second frame, of the front alone
+                proposal = agent.next_action()
+                if proposal.settled and number > 1:
+                    break
+                done = proposal.action or "flip"
+                observation, *_ = world.step(np.int64(named.assumptions.action_index(done)))
+                agent.did(done)
+            assert (proposal.purpose == "settled") == proposal.settled
+            verdict = agent.verdict
+            names.append((verdict.verdict, agent.learn()))
+        assert [verdict for verdict, _ in names] == ["novel", "novel", "known", "known", "known", "known"]
+        assert names[0][1] == names[2][1] == names[4][1] != names[1][1]
+
+    def test_what_was_done_may_be_something_else_than_was_proposed(self, named):
+        agent = RecognitionAgent(named, ModelParameters())
+        agent.observe(("tag-1", "tag-2"))
+        assert agent.next_action().action in ("flip", "left", "right")
+        assert agent.next_action().expected_entropy is not None
+        agent.did({"left": 0.9, None: 0.1})
+        agent.observe(None)
+        assert agent.verdict.verdict == "novel"
+        assert agent.learn("cup") == "cup"
+        assert named.names == ("cup",)
+        assert named["cup"].counts == {}  # it is not sure what was done
+        with pytest.raises(InvalidInputError, match="nothing seen yet"):
+            agent.verdict  # noqa: B018
+
+    def test_nothing_seen_is_no_verdict_and_nothing_to_learn(self, named):
+        agent = RecognitionAgent(named, ModelParameters())
+        agent.observe(None)
+        assert agent.verdict.verdict == "undecided"
+        assert agent.learn() is None
+        assert len(named) == 0
+
+    def test_two_processes_share_a_memory(self, named, tmp_path):
+        path = tmp_path / "robot.db"
+        open_memory(path, named.assumptions).close()
+        code = (
+            "import sys\nfrom atg_fg import RecognitionAgent, preset\n"
+            "from atg_fg.storage.memory_files import open_memory\n"
+            "with open_memory(sys.argv[1]) as memory:\n"
+            "    agent = RecognitionAgent(memory, preset('default'))\n"
+            "    for number in range(4):\n"
+            "        agent.observe((int(sys.argv[2]) + number, 11))\n"
+            "        print(agent.learn(f'{sys.argv[2]}-{number}'))\n"
+        )
+        running = [
+            subprocess.Popen([sys.executable, "-c", code, str(path), first], stdout=subprocess.PIPE, text=True)
+            for first in ("0", "4")
+        ]
+        assert [each.communicate(timeout=120)[0].split() for each in running] == [
+            [f"{first}-{number}" for number in range(4)] for first in ("0", "4")
+        ]
+        with open_memory(path, read_only=True) as memory:
+            assert sorted(memory.names) == sorted(f"{first}-{number}" for first in "04" for number in range(4))

@@ -1,0 +1,81 @@
+"""What a memory learns from what an engine has gone through: looks at rest as one, actions only where they are sure."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import NamedTuple
+
+from atg_fg.core.actions import NOTHING, UncertainAction
+from atg_fg.core.looks import strength
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.patterns import Evidence
+from atg_fg.inference.history import History
+
+
+class _Rest(NamedTuple):
+    """Looks without an action between them, and the action after them, ``None`` at the end or if it is not sure."""
+
+    looks: list[Evidence]
+    action: int | None
+
+    @property
+    def pattern(self) -> int | None:
+        """The first pattern that was seen whole."""
+        return next((look.pattern for look in self.looks if look.pattern is not None), None)
+
+    @property
+    def strongest(self) -> Evidence:
+        """The look that says most."""
+        return max(self.looks, key=strength)
+
+
+def learn_history(
+    memory: RobotMemory, history: History, matched: str | None, name: str | None = None, *, taught: bool = False
+) -> str | None:
+    """Let a memory learn from a trial, in one transaction if it is kept in a file; return the name of the ATG.
+
+    Args:
+        memory: What learns.
+        history: What was seen and done.
+        matched: Name of the ATG that the object is of, ``None`` if it is new.
+        name: Of the ATG of a new object; the next number if not given.
+        taught: Whether someone said of which object the trial is.
+
+    Returns:
+        ``None`` if no pattern was seen whole, so that nothing was learned.
+    """
+    rests = list(_rests(history))
+    patterns = [rest.pattern for rest in rests]
+    if all(pattern is None for pattern in patterns):
+        return None
+    with memory.transaction():
+        learned = memory.learn(patterns, [rest.action for rest in rests[:-1]], matched, name)
+        for piece in _pieces(rests):
+            looks = [rest.strongest for rest in piece]
+            detections = [look.detection or (None,) * len(memory.assumptions.alphabet.slots) for look in looks]
+            actions = [rest.action for rest in piece[:-1] if rest.action is not None]
+            confidences = [look.confidences for look in looks] if any(look.confidences for look in looks) else []
+            likelihoods = [look.slots for look in looks] if any(look.slots for look in looks) else []
+            learned = memory.learn_shared(learned, detections, actions, confidences, likelihoods, taught=taught)
+    return learned
+
+
+def _rests(history: History) -> Iterator[_Rest]:
+    """Yield the looks of each aspect."""
+    looks: list[Evidence] = []
+    for time, look in enumerate(history.evidence):
+        looks.append(look)
+        action = history.actions[time] if time + 1 < len(history.evidence) else None
+        if action != NOTHING:
+            yield _Rest(looks, None if isinstance(action, UncertainAction) else action)
+            looks = []
+
+
+def _pieces(rests: list[_Rest]) -> Iterator[list[_Rest]]:
+    """Yield the parts of a trial between which it is not sure what was done: each is a raw trial of the object."""
+    piece: list[_Rest] = []
+    for rest in rests:
+        piece.append(rest)
+        if rest.action is None:
+            yield piece
+            piece = []
