@@ -6,12 +6,14 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import gymnasium
 import pytest
 from gymnasium.utils.env_checker import check_env
 
-from atg_fg import load_memory
+from atg_fg import Assumptions, PatternAlphabet, load_memory
+from atg_fg.storage.memory_files import open_memory
 
 DOCS = Path(__file__).parents[1] / "docs"
 
@@ -197,3 +199,65 @@ def test_the_formats_page_shows_a_recording_that_is_read(tmp_path):
     (trial,) = read_recording(tmp_path / "looks.jsonl").trials
     assert (trial.name, trial.object, trial.actions) == ("0", "cup", ("rotate",))
     assert trial.looks[1].weights == ({"lid": 0.2, "logo": 0.8},)
+
+
+def test_a_robots_own_loop_prints_what_the_guide_says(tmp_path, monkeypatch, capsys):
+    monkeypatch.chdir(tmp_path)
+    run(blocks("live_robot.md")[0], "live_robot.md", {})
+    assert capsys.readouterr().out == blocks("live_robot.md", "text")[0]
+
+
+def test_the_ros_node_recognises_what_its_detector_says(tmp_path, monkeypatch):
+    """``rclpy`` is replaced by the three calls of it that the node makes: subscribe, publish, spin."""
+    monkeypatch.chdir(tmp_path)
+    alphabet = PatternAlphabet.named(("front",), ("logo", "text", "lid"), exclusive=False)
+    open_memory("robot.db", Assumptions(5, 3, ("rotate", "tip"), alphabet)).close()
+    published, heard = [], {}
+
+    class Publisher:
+        def __init__(self, topic):
+            self.topic = topic
+
+        def publish(self, message):
+            published.append((self.topic, message.data))
+
+    class Node:
+        def __init__(self, name):
+            assert name == "recogniser"
+
+        def create_subscription(self, kind, topic, callback, depth):
+            heard[topic] = callback
+
+        def create_publisher(self, kind, topic, depth):
+            return Publisher(topic)
+
+    def say(topic, data):
+        heard[topic](SimpleNamespace(data=data))
+
+    def spin(node):
+        labels = ["logo", "text", "lid"]
+        for _ in range(3):  # three trials of one object: each action shows the next label
+            before = len(published)
+            for place in range(8):
+                say("label", labels[place % 3])
+                if published and len(published) > before and published[-1][0] == "verdict":
+                    break
+                say("done", published[-1][1])
+        node.memory.close()
+
+    modules = {
+        "rclpy": SimpleNamespace(init=lambda: None, spin=spin),
+        "rclpy.node": SimpleNamespace(Node=Node),
+        "std_msgs.msg": SimpleNamespace(String=lambda data: SimpleNamespace(data=data)),
+    }
+    for name, module in {**modules, "std_msgs": SimpleNamespace()}.items():
+        monkeypatch.setitem(sys.modules, name, module)
+    code = blocks("live_robot.md")[1]
+    assert len(code.splitlines()) <= 40
+    variables = {"__name__": "node"}
+    run(code, "live_robot.md", variables)
+    variables["main"]()
+    verdicts = [data for topic, data in published if topic == "verdict"]
+    assert verdicts[0] == "novel"
+    with open_memory("robot.db", read_only=True) as memory:
+        assert len(memory) >= 1
