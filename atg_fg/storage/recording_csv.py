@@ -22,6 +22,8 @@ _NEEDED: Final = FIXED[:3]
 _CONFIDENCE: Final = "confidence"
 #: Characters of a field; a longer one is no label.
 _LONGEST: Final = 1000
+#: Faults that are kept of a file.
+MOST_FAULTS: Final = 1000
 
 
 class Fault(NamedTuple):
@@ -126,7 +128,7 @@ class CsvReader:
 
     Attributes:
         columns: Which is what.
-        faults: What was found to be wrong.
+        faults: What was found to be wrong: the first ``MOST_FAULTS``, and the first fatal one.
     """
 
     def __init__(
@@ -143,6 +145,7 @@ class CsvReader:
         self._labels = None if labels is None else set(labels)
         self._actions = None if actions is None else set(actions)
         self.faults: list[Fault] = []
+        self._is_fatal = False
         header = next(self._rows, None)
         if not header:
             raise InvalidInputError("line 1: empty; expected the names of the columns")
@@ -267,7 +270,10 @@ class CsvReader:
 
     def _fault(self, kind: str, line: int, column: str, what: str, *, fatal: bool = True) -> None:
         place = f"line {line}, column {column!r}" if column else f"line {line}"
-        self.faults.append(Fault(kind, place, what, fatal))
+        # However many there are, the first fatal one is among those that are kept.
+        if len(self.faults) < MOST_FAULTS or (fatal and not self._is_fatal):
+            self.faults.append(Fault(kind, place, what, fatal))
+        self._is_fatal = self._is_fatal or fatal
 
 
 def write_csv(slots: Sequence[str], trials: Sequence[RecordedTrial]) -> str:

@@ -2,6 +2,8 @@
 
 import gzip
 import json
+import subprocess
+import sys
 
 import pytest
 from hypothesis import given
@@ -9,6 +11,7 @@ from hypothesis import strategies as st
 
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.recordings import RecordedLook, RecordedTrial, Recording, used_labels
+from atg_fg.storage.recording_csv import MOST_FAULTS
 from atg_fg.storage.recordings import (
     RecordingSpec,
     check_recording,
@@ -256,3 +259,38 @@ def test_the_check_finds_what_no_row_shows_by_itself(written, kind, change):
     header, *rows = ODD.splitlines()
     text = "\n".join([header, *filter(None, map(change, rows))]) + "\n"
     assert kind in {fault.kind for fault in check_recording(written(text), SPEC)[1]}
+
+
+def test_of_many_faults_the_first_are_kept_and_the_first_fatal_one(written):
+    rows = [f"{trial},{step},{'go' if step < 2 else 'end'},a" for trial in range(1500) for step in range(3)]
+    path = written("\n".join(["trial,step,action,label", *rows, "x,0,,a", "x,1,,a"]) + "\n")
+    faults = [fault for fault in check_recording(path)[1] if fault.place.startswith("line")]
+    assert len(faults) == MOST_FAULTS + 1
+    assert {fault.kind for fault in faults[:-1]} == {"action at the end"}
+    with pytest.raises(InvalidInputError, match="line 4502, column 'action': empty"):
+        read_recording(path)
+
+
+READ = """
+import resource, sys
+from atg_fg.storage.recordings import read_recording
+before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+recording = read_recording(sys.argv[1])
+after = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+print(len(recording.trials), sum(len(trial.looks) for trial in recording.trials), (after - before) // 1024)
+"""
+
+
+@pytest.mark.slow
+def test_a_million_rows_are_read_in_bounded_memory(written):
+    pytest.importorskip("resource")
+    rows = (
+        f"{trial},{step},{'turn' if step < 9 else ''},l{(7 * trial + step) % 50},0.{(trial + step) % 90 + 10}"
+        for trial in range(100_000)
+        for step in range(10)
+    )
+    path = written("trial,step,action,label,label:confidence\n" + "\n".join(rows) + "\n")
+    done = subprocess.run([sys.executable, "-c", READ, path], capture_output=True, text=True, check=True)
+    n_trials, n_looks, mebibytes = map(int, done.stdout.split())
+    assert (n_trials, n_looks) == (100_000, 1_000_000)
+    assert mebibytes < 600  # about 210 where it was written
