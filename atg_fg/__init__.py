@@ -22,9 +22,11 @@ if TYPE_CHECKING:
     from atg_fg.core.parameters import ModelParameters
     from atg_fg.core.patterns import Evidence, PatternAlphabet
     from atg_fg.core.records import TrialRecord
+    from atg_fg.display.comparison_plot import plot_comparison
     from atg_fg.display.success_plots import plot_ablation, plot_success
     from atg_fg.display.trial_plots import plot_atg, plot_belief, plot_entropy
     from atg_fg.engines import ENGINES, begin_trial
+    from atg_fg.experiments.engine_comparison import compare_engines
     from atg_fg.experiments.recognition_agent import RecognitionAgent
     from atg_fg.experiments.recognition_env import RecognitionEnv
     from atg_fg.experiments.result_tables import results_table
@@ -83,6 +85,7 @@ __all__ = [
     "arcube_assumptions",
     "assumptions_of",
     "begin_trial",
+    "compare_engines",
     "learn_from",
     "load_memory",
     "make_arcubes",
@@ -92,6 +95,7 @@ __all__ = [
     "plot_ablation",
     "plot_atg",
     "plot_belief",
+    "plot_comparison",
     "plot_entropy",
     "plot_success",
     "preset",

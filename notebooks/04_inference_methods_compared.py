@@ -72,21 +72,8 @@ assert all(entry["same_decision"]["rate"] == 1 for entry in summary.values() if 
 # result is biased. Mean field forgets what object and aspect tell about each other, which in this model is much.
 
 # %%
-with plot_style():
-    figure = figure_class()(figsize=(7.2, 3.8), layout="constrained")
-    axes = figure.subplots()
-    off = [engine for engine, entry in summary.items() if entry["total_variation"]["worst"] > 1e-9]
-    for colour, engine in zip(PALETTE, off, strict=False):
-        errors, ratio = np.array(records[engine].total_variation), summary[engine]["time_ratio"]
-        mean, half = errors.mean(), 1.96 * errors.std(ddof=1) / np.sqrt(len(errors))
-        axes.plot(ratio["quartiles"], [mean] * 2, color=colour, alpha=0.5)
-        axes.errorbar(ratio["median"], mean, yerr=half, fmt="o", color=colour)
-        axes.annotate(engine, (ratio["median"], mean), (7, 7), textcoords="offset points", color=colour)
-    axes.set(xscale="log", xlabel="time of a decision, as a ratio to bayes-filter", ylim=(0, None))
-    axes.margins(x=0.15)
-    axes.set_ylabel("total variation to exact")
-    axes.set_title("Mean error with 95 % interval, quartiles of the time")
-figure
+off = {engine: record for engine, record in records.items() if record.total_variation.max() > 1e-9}
+atg.plot_comparison(off, title="Mean error with 95 % interval, quartiles of the time")
 
 # %% [markdown]
 # ## More particles, less error
@@ -148,5 +135,6 @@ for engine in ("loopy-bp", "gibbs", "mean-field"):
     print(f"{engine:<11} error {error:.4f}  {inference.report}")
 
 # %% [markdown]
-# `atg-fg engines compare --trials 50` makes this comparison at any size, and `atg-fg engines check --engine NAME`
-# tests posteriors against objects that were drawn from the model itself.
+# `atg-fg engines compare --trials 50` makes this comparison at any size, `atg.compare_engines` on a memory and trials
+# of your own, and `atg-fg engines check --engine NAME` tests posteriors against objects that were drawn from the model
+# itself.

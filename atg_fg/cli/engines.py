@@ -3,17 +3,27 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Annotated
+from pathlib import Path
+from typing import Annotated, Any
 
 import typer
 
 from atg_fg.cli import options
 from atg_fg.cli.terminal import say
-from atg_fg.core.errors import unknown_name
-from atg_fg.engines import ENGINES
+from atg_fg.core.checks import whole_number
+from atg_fg.core.errors import InvalidInputError, unknown_name
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.recordings import Recording, assumptions_for
+from atg_fg.display import figures
+from atg_fg.display.comparison_plot import plot_comparison
+from atg_fg.engines import ENGINES, engine_for
+from atg_fg.engines.options import name_and_options, named_engines
 from atg_fg.experiments import calibration, engine_comparison
 from atg_fg.experiments.document_tables import tables_of
+from atg_fg.storage.memory_files import load_memory
+from atg_fg.storage.memory_json import extended_memory
 from atg_fg.storage.presets import preset as preset_named
+from atg_fg.storage.recordings import read_recording
 
 app = typer.Typer(
     help="Compare inference engines, and check that one is calibrated. Example: atg-fg engines compare",
@@ -23,8 +33,16 @@ app = typer.Typer(
 
 @app.command()
 def compare(
-    trials: options.Trials = 50,
-    engines: Annotated[str, typer.Option(help=f"all, or a list such as gtsam,particle. {', '.join(ENGINES)}.")] = "all",
+    trials: Annotated[str, typer.Option(help="Number of trials; or a recording of your own, with --memory.")] = "50",
+    memory: Annotated[
+        Path | None, typer.Option(help="A memory of your own; one of random cubes if not given.", show_default=False)
+    ] = None,
+    engines: Annotated[
+        str,
+        typer.Option(
+            help=f"all, or a list such as gtsam,particle(n_particles=500). {', '.join(ENGINES)}."
+        ),
+    ] = "all",
     objects: Annotated[int, typer.Option(help="Objects that exist.")] = 100,
     remembered: Annotated[int, typer.Option(help="Objects in the memory.")] = 20,
     actions: options.Actions = 6,
@@ -34,33 +52,66 @@ def compare(
     missing: options.Missing = 0.0,
     seed: options.Seed = 0,
     json_file: options.JsonFile = None,
+    plot: Annotated[
+        Path | None, typer.Option(writable=True, help="Draw error against time into this .png, .svg or .pdf file.")
+    ] = None,
 ) -> None:
     """Compare inference engines on the same trials: error against exact, decisions, and cost.
 
-    Example: atg-fg engines compare --trials 10 --engines bayes-filter,gtsam,mean-field
+    Example: atg-fg engines compare --trials 10 --engines "bayes-filter,particle(n_particles=500)"
     """
     options.check_json_option(json_file)
-    names = list(ENGINES) if engines == "all" else engines.split(",")
+    if plot is not None:
+        figures.check_figure_path(plot)
+    names = list(ENGINES) if engines == "all" else named_engines(engines)
     for name in names:
-        if name not in ENGINES:
-            raise unknown_name("engine", name, ["all", *ENGINES])
-    plan = engine_comparison.ComparisonPlan(
-        n_trials=trials,
-        n_actions=actions,
-        n_objects=objects,
-        n_remembered=remembered,
-        parameters=preset_named(preset),
-        world_options=options.world_options(slip, wrong, missing),
-    )
-    with options.progress_bar("trials", trials) as advance:
-        summary = engine_comparison.summarise(engine_comparison.compare(plan, names, seed, advance))
-    parameters = {"trials": trials, "objects": objects, "remembered": remembered, "actions": actions, "preset": preset}
-    parameters |= {"slip": slip, "wrong": wrong, "missing": missing, "seed": seed}
-    document = {"command": "compare", "parameters": parameters, "engines": summary}
-    options.write_json(document, json_file)
-    if json_file != "-":
+        if (bare := name_and_options(name)[0]) not in ENGINES and ":" not in bare:
+            raise unknown_name("engine", bare, ["all", *ENGINES])
+    parameters = preset_named(preset)
+    given: dict[str, Any] = {"trials": trials, "preset": preset}
+    if memory is None:
+        plan = engine_comparison.ComparisonPlan(
+            n_trials=_number_of_trials(trials),
+            n_actions=actions,
+            n_objects=objects,
+            n_remembered=remembered,
+            parameters=parameters,
+            world_options=options.world_options(slip, wrong, missing),
+        )
+        with options.progress_bar("trials", plan.n_trials) as advance:
+            records = engine_comparison.compare(plan, names, seed, advance)
+        given |= {"trials": plan.n_trials, "objects": objects, "remembered": remembered, "actions": actions}
+        given |= {"slip": slip, "wrong": wrong, "missing": missing, "seed": seed}
         title = f"{trials} trials of {actions} actions, {remembered} of {objects} objects remembered, preset {preset}"
+    else:
+        held, recording = _memory_and_recording(memory, trials)
+        with options.progress_bar("trials", len(recording.trials)) as advance:
+            records = engine_comparison.compare_engines(names, held, recording.trials, parameters, advance)
+        given["memory"] = str(memory)
+        title = f"{len(recording.trials)} trials of {trials}, memory {memory}, preset {preset}"
+    document = {"command": "compare", "parameters": given, "engines": engine_comparison.summarise(records)}
+    options.write_json(document, json_file)
+    if plot is not None:
+        figures.save_figure(plot_comparison(records), plot)
+    if json_file != "-":
         options.print_tables(tables_of(document), title)
+
+
+def _number_of_trials(trials: str) -> int:
+    try:
+        number = int(trials)
+    except ValueError:
+        raise InvalidInputError(
+            f"--trials: {trials!r}; expected a number, or a recording together with --memory"
+        ) from None
+    return whole_number(number, "--trials", 1)
+
+
+def _memory_and_recording(memory: Path, trials: str) -> tuple[RobotMemory, Recording]:
+    """Return a memory that knows all labels of a recording, and the recording."""
+    held, recording = load_memory(memory), read_recording(trials)
+    assumptions = assumptions_for(recording, held.assumptions)
+    return (held if assumptions == held.assumptions else extended_memory(held, assumptions)), recording
 
 
 @app.command()
@@ -75,8 +126,7 @@ def check(
     Example: atg-fg engines check --engine bayes-filter --trials 500
     """
     options.check_json_option(json_file)
-    if engine not in ENGINES:
-        raise unknown_name("engine", engine, ENGINES)
+    engine_for(engine)
     plan = replace(calibration.PLAN, n_trials=trials)
     with options.progress_bar("trials", trials) as advance:
         summary = calibration.summarise(calibration.run_calibration(engine, plan, seed, advance))

@@ -4,19 +4,23 @@ from __future__ import annotations
 
 import statistics
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from atg_fg.core.assumptions import arcube_assumptions
+from atg_fg.core.assumptions import Assumptions, arcube_assumptions
 from atg_fg.core.errors import InvalidInputError, TooLargeError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
-from atg_fg.core.patterns import Evidence, FloatArray
+from atg_fg.core.patterns import Evidence, FloatArray, read_only
+from atg_fg.core.recordings import RecordedTrial
+from atg_fg.core.records import TrialRecord
 from atg_fg.core.statistics import wilson_interval
-from atg_fg.engines import ENGINES, begin_trial
+from atg_fg.engines import begin_trial, engine_for
+from atg_fg.engines.options import check_known, name_and_options
 from atg_fg.experiments.exploration import learned_memory
 from atg_fg.inference.expected_entropy import best_actions
 from atg_fg.inference.interface import Inference
@@ -63,83 +67,180 @@ class ComparisonPlan:
         cubes = make_arcubes(self.n_objects, seed=0)[: self.n_remembered]
         return learned_memory(arcube_assumptions(self.n_objects), cubes, RandomPolicy(), self.n_learning_actions, rng)
 
+    def drawn_course(self, memory: RobotMemory, rng: np.random.Generator) -> Course:
+        """Return what is seen and done in a trial with random actions."""
+        world = make_world("ideal", cubes=make_arcubes(self.n_objects, seed=0), **self.world_options)
+        observation, _ = world.reset(seed=int(rng.integers(2**31)))
+        # One action more than is done, so that the same seeds draw the same trials as ever.
+        actions = rng.integers(len(memory.assumptions.actions), size=self.n_actions + 1)[:-1]
+        looks = [Evidence.of_detection(memory.assumptions.alphabet, detection_of(observation))]
+        for action in actions:
+            observation, *_ = world.step(action)
+            looks.append(Evidence.of_detection(memory.assumptions.alphabet, detection_of(observation)))
+        return Course(looks, [int(action) for action in actions])
 
-@dataclass
+
+class Course(NamedTuple):
+    """What is seen and done in a trial: t + 1 looks, and the t actions between them."""
+
+    looks: Sequence[Evidence]
+    actions: Sequence[int]
+
+    @classmethod
+    def of(cls, trial: RecordedTrial | TrialRecord, assumptions: Assumptions) -> Course:
+        """Return what was seen and done in a trial of a recording, or in one that was run.
+
+        Raises:
+            InvalidInputError: It has a label or an action that is unknown under these assumptions.
+        """
+        if isinstance(trial, RecordedTrial):
+            looks = [look.evidence(assumptions.alphabet) for look in trial.looks]
+            return cls(looks, [assumptions.action_index(action) for action in trial.actions])
+        looks = []
+        for step in trial.steps:
+            soft = step.truth.get("likelihoods", ())
+            given = (step.detection, step.confidences)
+            looks.append(
+                Evidence.of_slots(assumptions.alphabet, soft, *given)
+                if soft
+                else Evidence.of_detection(assumptions.alphabet, *given)
+            )
+        return cls(looks, trial.actions)
+
+
+@dataclass(frozen=True, eq=False)
 class EngineRecord:
-    """What was measured of one engine.
+    """What was measured of one engine, decision by decision: a look, and the expected entropies after it.
 
     Attributes:
-        total_variation: Of p(O) to the reference's after each look.
-        same_decision: Whether the engine's best action is one of the reference's, after each look.
-        time_ratios: Seconds of each decision (a look, its expected entropies) over the reference's, measured in turn.
-        refused: Why the engine did not do the trials, if it is too small for them.
+        exact: Whether the engine says that it is.
+        total_variation: ½ Σ |p(O) − q(O)| to the reference, shape [looks of all trials].
+        same_decision: Whether the engine's best action is one of the reference's, shape [looks].
+        seconds: Of each decision, shape [looks].
+        reference_seconds: Of the reference, measured in turn with the engine, shape [looks].
+        refused: Why the engine did not do the trials, if it is too small for them; ``None`` if it did.
     """
 
-    total_variation: list[float] = field(default_factory=list)
-    same_decision: list[bool] = field(default_factory=list)
-    time_ratios: list[float] = field(default_factory=list)
+    exact: bool
+    total_variation: FloatArray
+    same_decision: NDArray[np.bool_]
+    seconds: FloatArray
+    reference_seconds: FloatArray
     refused: str | None = None
+
+    @property
+    def time_ratios(self) -> FloatArray:
+        """Seconds of each decision over the reference's, shape [looks]."""
+        return self.seconds / self.reference_seconds
 
 
 def compare(
-    plan: ComparisonPlan, engines: Sequence[str], seed: int = 0, on_trial: Callable[[], None] | None = None
+    plan: ComparisonPlan,
+    engines: Sequence[str | type[Inference]],
+    seed: int = 0,
+    on_trial: Callable[[], None] | None = None,
 ) -> dict[str, EngineRecord]:
-    """Let engines follow the same trials, look by look, side by side with the reference.
+    """Let engines follow the same trials, drawn at random, side by side with the reference.
 
     Args:
         plan: The trials.
-        engines: Names of engines.
+        engines: As for ``compare_engines``.
         seed: Seed of memory and trials.
         on_trial: Called after each trial.
     """
     memory_seed, *trial_seeds = np.random.SeedSequence(seed).spawn(1 + plan.n_trials)
     memory = plan.learned_memory(np.random.default_rng(memory_seed))
-    records = {engine: EngineRecord() for engine in engines}
-    for trial_seed in trial_seeds:
-        course = _drawn_course(plan, memory, np.random.default_rng(trial_seed))
-        for engine, record in records.items():
-            if record.refused is None:
-                _follow(engine, memory, plan.parameters, course, record)
+    courses = [plan.drawn_course(memory, np.random.default_rng(trial_seed)) for trial_seed in trial_seeds]
+    return compare_engines(engines, memory, courses, plan.parameters, on_trial)
+
+
+def compare_engines(
+    engines: Sequence[str | type[Inference]],
+    memory: RobotMemory,
+    trials: Sequence[RecordedTrial | TrialRecord | Course],
+    parameters: ModelParameters | None = None,
+    on_trial: Callable[[], None] | None = None,
+) -> dict[str, EngineRecord]:
+    """Let engines follow trials of one's own, look by look, side by side with the reference, ``bayes-filter``.
+
+    Args:
+        engines: Names, with options if need be (``"particle(n_particles=500)"``), ``module:Class``, or classes.
+        memory: What the robot remembers when each of the trials begins; it is not changed.
+        trials: Of a recording (``Recording.trials``), records of trials that were run, or looks with actions.
+        parameters: Of the model.
+        on_trial: Called after each trial.
+
+    Returns:
+        What was measured, by the engine as it was written, or by the name of a class.
+
+    Raises:
+        UnknownNameError: No engine has this name.
+        InvalidInputError: An engine has no such option or does not know the model; a trial does not fit the memory; or
+            there is none.
+    """
+    parameters = parameters or ModelParameters()
+    courses = [each if isinstance(each, Course) else Course.of(each, memory.assumptions) for each in trials]
+    if not courses:
+        raise InvalidInputError("trials: none; expected at least one")
+    engine_for(REFERENCE, parameters)
+    tried = {each if isinstance(each, str) else each.name: _Tried.of(each, parameters) for each in engines}
+    for course in courses:
+        for each in tried.values():
+            if each.refused is None:
+                each.follow(memory, parameters, course)
         if on_trial is not None:
             on_trial()
-    return records
+    return {name: each.record() for name, each in tried.items()}
 
 
-def _drawn_course(plan: ComparisonPlan, memory: RobotMemory, rng: np.random.Generator) -> list[tuple[Evidence, int]]:
-    """Return what is seen and done in a trial with random actions: (evidence, action after it)."""
-    world = make_world("ideal", cubes=make_arcubes(plan.n_objects, seed=0), **plan.world_options)
-    observation, _ = world.reset(seed=int(rng.integers(2**31)))
-    course = []
-    for action in rng.integers(len(memory.assumptions.actions), size=plan.n_actions + 1):
-        evidence = Evidence.of_detection(memory.assumptions.alphabet, detection_of(observation))
-        course.append((evidence, int(action)))
-        observation, *_ = world.step(action)
-    return course
+class _Decision(NamedTuple):
+    total_variation: float
+    same: bool
+    seconds: float
+    reference_seconds: float
 
 
-def _follow(
-    engine: str,
-    memory: RobotMemory,
-    parameters: ModelParameters,
-    course: Sequence[tuple[Evidence, int]],
-    record: EngineRecord,
-) -> None:
-    """Let an engine and the reference go through a trial in turn, and note how they differ."""
-    try:
-        tried, reference = begin_trial(engine, memory, parameters), begin_trial(REFERENCE, memory, parameters)
-        for look, (evidence, action) in enumerate(course):
-            # Each engine goes first in every other look: the second one finds warm caches.
-            pair = [tried, reference] if look % 2 else [reference, tried]
-            timed = {id(inference): _timed_decision(inference, evidence) for inference in pair}
-            (seconds, expected), (reference_seconds, exact) = timed[id(tried)], timed[id(reference)]
-            record.total_variation.append(total_variation(tried, reference))
-            record.same_decision.append(best_actions(expected)[0] in best_actions(exact))
-            record.time_ratios.append(seconds / reference_seconds)
-            if look < len(course) - 1:
-                tried.act(action)
-                reference.act(action)
-    except TooLargeError as error:
-        record.refused = str(error)
+@dataclass
+class _Tried:
+    """An engine that is compared, and what was measured of it so far."""
+
+    engine: type[Inference]
+    options: dict[str, Any]
+    decisions: list[_Decision] = field(default_factory=list)
+    refused: str | None = None
+
+    @classmethod
+    def of(cls, engine: str | type[Inference], parameters: ModelParameters) -> _Tried:
+        name, options = name_and_options(engine) if isinstance(engine, str) else (engine, {})
+        found = engine_for(name, parameters)
+        check_known(found, found.name, options)
+        return cls(found, options)
+
+    def follow(self, memory: RobotMemory, parameters: ModelParameters, course: Course) -> None:
+        """Let the engine and the reference go through a trial in turn, and note how they differ."""
+        try:
+            tried = begin_trial(self.engine, memory, parameters, **self.options)
+            reference = begin_trial(REFERENCE, memory, parameters)
+            for look, evidence in enumerate(course.looks):
+                # Each engine goes first in every other look: the second one finds warm caches.
+                pair = [tried, reference] if look % 2 else [reference, tried]
+                timed = {id(inference): _timed_decision(inference, evidence) for inference in pair}
+                (seconds, expected), (reference_seconds, exact) = timed[id(tried)], timed[id(reference)]
+                same = best_actions(expected)[0] in best_actions(exact)
+                distance = total_variation(tried, reference)
+                self.decisions.append(_Decision(distance, same, seconds, reference_seconds))
+                if look < len(course.actions):
+                    tried.act(course.actions[look])
+                    reference.act(course.actions[look])
+        except TooLargeError as error:
+            self.refused = str(error)
+
+    def record(self) -> EngineRecord:
+        columns = np.array(self.decisions, dtype=float).reshape(-1, len(_Decision._fields)).T
+        distance, same, seconds, reference_seconds = map(read_only, columns)
+        return EngineRecord(
+            self.engine.exact, distance, read_only(same.astype(bool)), seconds, reference_seconds, self.refused
+        )
 
 
 def _timed_decision(inference: Inference, evidence: Evidence) -> tuple[float, FloatArray]:
@@ -155,20 +256,24 @@ def total_variation(one: Inference, other: Inference) -> float:
     return float(np.abs(p.objects - q.objects).sum() + abs(p.unseen - q.unseen)) / 2
 
 
-def summarise(records: dict[str, EngineRecord]) -> dict[str, Any]:
-    """Return for each engine whether it is exact, its errors, its decisions, and its cost relative to the reference."""
-    return {engine: _summary(engine, record) for engine, record in records.items()}
+def summarise(records: Mapping[str, EngineRecord]) -> dict[str, Any]:
+    """Return for each engine whether it is exact, its errors, its decisions, and its cost: as ``--json`` writes it."""
+    return {engine: _summary(record) for engine, record in records.items()}
 
 
-def _summary(engine: str, record: EngineRecord) -> dict[str, Any]:
-    summary: dict[str, Any] = {"exact": ENGINES[engine].exact, "refused": record.refused}
+def _summary(record: EngineRecord) -> dict[str, Any]:
+    summary: dict[str, Any] = {"exact": record.exact, "refused": record.refused}
     if record.refused is None:
-        same, looks = sum(record.same_decision), len(record.same_decision)
-        quartiles = statistics.quantiles(record.time_ratios, n=4)
+        same, looks = int(record.same_decision.sum()), len(record.same_decision)
+        low, median, high = np.quantile(record.time_ratios, (0.25, 0.5, 0.75)).tolist()
+        distance = record.total_variation
         summary |= {
             "looks": looks,
-            "total_variation": {"mean": statistics.fmean(record.total_variation), "worst": max(record.total_variation)},
+            "total_variation": {"mean": statistics.fmean(distance), "worst": float(distance.max())},
             "same_decision": {"rate": same / looks, "interval95": list(wilson_interval(same, looks))},
-            "time_ratio": {"median": quartiles[1], "quartiles": [quartiles[0], quartiles[2]]},
+            "time_ratio": {"median": median, "quartiles": [low, high]},
+            "errors": distance.tolist(),
+            "seconds": record.seconds.tolist(),
+            "reference_seconds": record.reference_seconds.tolist(),
         }
     return summary

@@ -27,6 +27,25 @@ def test_compare_says_for_each_engine_how_exact_it_is(run):
     assert gtsam["time_ratio"]["median"] > 0
 
 
+def test_compare_takes_a_memory_and_trials_of_ones_own(run, tmp_path):
+    looks, memory = tmp_path / "looks.csv", tmp_path / "mugs.json"
+    looks.write_text("trial,step,action,view\n1,0,turn,logo\n1,1,turn,handle\n1,2,,logo\n2,0,turn,plain\n2,1,,logo\n")
+    assert run("learn", looks, "--memory", memory, "--objects", 3, "--preset", "default")[0] == 0
+    with looks.open("a") as file:
+        file.write("3,0,,scratch\n")  # a label that the memory has not met
+    plot = tmp_path / "errors.png"
+    status, output, error = run(
+        "engines", "compare", "--memory", memory, "--trials", looks,
+        "--engines", "gtsam,particle(n_particles=9,seed=1)", "--json", "-", "--plot", plot,
+    )  # fmt: skip
+    assert (status, error) == (0, "")
+    engines = json.loads(output)["engines"]
+    assert list(engines) == ["gtsam", "particle(n_particles=9,seed=1)"]
+    assert [len(engines["gtsam"][key]) for key in ("errors", "seconds", "reference_seconds")] == [6, 6, 6]
+    assert max(engines["gtsam"]["errors"]) == engines["gtsam"]["total_variation"]["worst"] < 1e-12
+    assert plot.read_bytes().startswith(b"\x89PNG")
+
+
 def test_compare_prints_a_table(run):
     status, output, error = run(
         "engines", "compare", "--trials", 1, "--actions", 1, "--remembered", 1, "--engines", "bayes-filter"
@@ -73,7 +92,9 @@ def test_bad_options_are_refused(refused):
     assert "unknown name 'magic'" in refused("engines", "compare", "--engines", "magic")
     assert "unknown name 'magic'" in refused("engines", "check", "--engine", "magic")
     assert "'--trials': Input should be greater than or equal to 2" in refused("engines", "check", "--trials", 1)
-    assert "'--trials': Input should be greater than or equal to 1" in refused("engines", "compare", "--trials", 0)
+    assert "--trials: 0; expected a whole number of at least 1" in refused("engines", "compare", "--trials", 0)
+    assert "together with --memory" in refused("engines", "compare", "--trials", "looks.csv")
+    assert "unknown option 'particles'" in refused("engines", "compare", "--engines", "particle(particles=1)")
     assert "'--k': Input should be greater than or equal to 1" in refused(
         "explain", "tests/data/scripted_trial.json", "--k", 0
     )

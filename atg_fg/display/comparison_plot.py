@@ -1,0 +1,62 @@
+"""Engines compared: how far each is from exact inference, against the time of a decision."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Protocol
+
+import numpy as np
+
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.patterns import FloatArray
+from atg_fg.display.figures import PALETTE, plot_style
+from atg_fg.display.plot_parts import figure_with_axes
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+_MARKERS = "os^Dvp"
+
+
+class Compared(Protocol):
+    """What was measured of an engine: errors and seconds of each decision, shape [looks]; or why it was refused."""
+
+    @property
+    def total_variation(self) -> FloatArray: ...  # noqa: D102
+    @property
+    def seconds(self) -> FloatArray: ...  # noqa: D102
+    @property
+    def refused(self) -> str | None: ...  # noqa: D102
+
+
+def plot_comparison(records: Mapping[str, Compared], *, title: str = "Error against the time of a decision") -> Figure:
+    """Plot the error of each engine, mean with 95 % interval, against its time of a decision, median with quartiles.
+
+    Args:
+        records: By name, as ``compare_engines`` returns them; engines that were refused are left out.
+        title: Title above the plot.
+
+    Raises:
+        InvalidInputError: There is no engine that was not refused.
+        MissingDependencyError: matplotlib is not installed.
+    """
+    ran = {name: record for name, record in records.items() if record.refused is None and len(record.seconds)}
+    if not ran:
+        raise InvalidInputError("comparison plot: no engine that did the trials; expected at least one")
+    with plot_style():
+        figure, axes = figure_with_axes(7.2, 3.8)
+        for rank, (name, record) in enumerate(ran.items()):
+            low, median, high = 1000 * np.quantile(record.seconds, (0.25, 0.5, 0.75))
+            errors = record.total_variation
+            half = 1.96 * errors.std(ddof=1) / np.sqrt(len(errors)) if len(errors) > 1 else 0.0
+            axes.errorbar(
+                median, errors.mean(), yerr=half, xerr=[[median - low], [high - median]], elinewidth=1, alpha=0.9,
+                color=PALETTE[rank % len(PALETTE)], fmt=_MARKERS[rank // len(PALETTE) % len(_MARKERS)], label=name,
+            )  # fmt: skip
+        axes.set(xscale="log", xlabel="time of a decision, ms (median and quartiles)")
+        axes.set_ylabel("total variation to exact inference")
+        axes.set_ylim(bottom=min(0.0, -0.03 * axes.get_ylim()[1]))
+        axes.set_title(title, parse_math=False)
+        for text in figure.legend(loc="outside right center", fontsize=8).get_texts():
+            text.set_parse_math(False)
+    return figure
