@@ -39,9 +39,7 @@ def compare(
     ] = None,
     engines: Annotated[
         str,
-        typer.Option(
-            help=f"all, or a list such as gtsam,particle(n_particles=500). {', '.join(ENGINES)}."
-        ),
+        typer.Option(help=f"all, or a list such as gtsam,particle(n_particles=500). {', '.join(ENGINES)}."),
     ] = "all",
     objects: Annotated[int, typer.Option(help="Objects that exist.")] = 100,
     remembered: Annotated[int, typer.Option(help="Objects in the memory.")] = 20,
