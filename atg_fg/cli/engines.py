@@ -66,7 +66,7 @@ def compare(
         if (bare := name_and_options(name)[0]) not in ENGINES and ":" not in bare:
             raise unknown_name("engine", bare, ["all", *ENGINES])
     parameters = preset_named(preset)
-    given: dict[str, Any] = {"trials": trials, "preset": preset}
+    given: dict[str, Any]
     if memory is None:
         plan = engine_comparison.ComparisonPlan(
             n_trials=_number_of_trials(trials),
@@ -78,14 +78,14 @@ def compare(
         )
         with options.progress_bar("trials", plan.n_trials) as advance:
             records = engine_comparison.compare(plan, names, seed, advance)
-        given |= {"trials": plan.n_trials, "objects": objects, "remembered": remembered, "actions": actions}
-        given |= {"slip": slip, "wrong": wrong, "missing": missing, "seed": seed}
+        given = {"trials": plan.n_trials, "objects": objects, "remembered": remembered, "actions": actions}
+        given |= {"preset": preset, "slip": slip, "wrong": wrong, "missing": missing, "seed": seed}
         title = f"{trials} trials of {actions} actions, {remembered} of {objects} objects remembered, preset {preset}"
     else:
         held, recording = _memory_and_recording(memory, trials)
         with options.progress_bar("trials", len(recording.trials)) as advance:
             records = engine_comparison.compare_engines(names, held, recording.trials, parameters, advance)
-        given["memory"] = str(memory)
+        given = {"trials": trials, "memory": str(memory), "preset": preset}
         title = f"{len(recording.trials)} trials of {trials}, memory {memory}, preset {preset}"
     document = {"command": "compare", "parameters": given, "engines": engine_comparison.summarise(records)}
     options.write_json(document, json_file)
