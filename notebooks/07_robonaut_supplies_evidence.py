@@ -224,9 +224,9 @@ print("slots detected rightly:", rate(int(np.trace(confusion)), int(confusion.su
 print("looks with a wrong symbol:", rate(sum(look.n_wrong > 0 for look in looks), len(looks)))
 
 # %% [markdown]
-# Every slot was read rightly, in spite of the noise. That is no proof that the camera never errs: with so few looks the
-# interval still allows for a wrong look now and then. It takes looks to be independent, too, which those at one cube
-# are not quite.
+# No symbol was read wrongly, in spite of the noise; in one slot nothing was detected. That is no proof that the camera
+# never errs: with so few looks the interval still allows for a wrong look now and then. It takes looks to be
+# independent, too, which those at one cube are not quite.
 
 # %% [markdown]
 # ## What the hands do
