@@ -12,6 +12,7 @@ import time
 from collections.abc import Callable
 from functools import cache
 from importlib import import_module
+from pathlib import Path
 from typing import Any, Final
 
 from benchmarks.contestants import EngineContestant, follow, large_memory
@@ -72,6 +73,10 @@ def _tests() -> Any:
 
 def peak() -> dict[str, list[float]]:
     """Return the most bytes of memory that this process has held."""
+    status = Path("/proc/self/status")
+    if status.exists():  # the other way Linux counts what the process that began this one held, too
+        (kilobytes,) = (line.split()[1] for line in status.read_text().splitlines() if line.startswith("VmHWM:"))
+        return {"bytes": [1024.0 * float(kilobytes)]}
     unit = 1 if sys.platform == "darwin" else 1024
     return {"bytes": [float(unit * resource.getrusage(resource.RUSAGE_SELF).ru_maxrss)]}
 

@@ -17,6 +17,9 @@ from atg_fg.kernels.belief_kernels import Tables, weigh
 ROOM: Final = 12
 
 
+#: Rows that there is more room for, at most.
+_MOST_MORE: Final = 1000
+
 #: Trials whose arrays are kept: one that has ended, and the one before it, as the next begins before it is gone.
 _SPARE: Final = 2
 
@@ -147,14 +150,15 @@ class MemoryTables:
         self._n_edges = last + ROOM
 
     def _make(self, memory: RobotMemory) -> None:
-        """Make all tables anew, with half as many rows and edges again as there are."""
+        """Make all tables anew, with half as many rows again as there are, but for large memories."""
         graphs = list(memory)
         self._counts = [graph.count_table for graph in graphs]
         self._n_known = [graph.n_known for graph in graphs]
         n_rows = len(graphs) + 1
         n_edges = sum(map(len, self._counts)) + ROOM * n_rows
+        more = min(16 + n_rows // 2, _MOST_MORE)
         width = 1 + min(max(self._n_known, default=0) + 2 * ROOM, self._n_aspects)
-        self._tables = _empty(n_rows + n_rows // 2, n_edges + n_edges // 2, width, self._n_actions, self._small)
+        self._tables = _empty(n_rows + more, n_edges + 2 * ROOM * more, width, self._n_actions, self._small)
         self._n_edges = 0
         self._spare.clear()
         for number, (graph, counts) in enumerate(zip(graphs, self._counts, strict=True)):
