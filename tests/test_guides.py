@@ -6,7 +6,7 @@ import shlex
 import subprocess
 import sys
 from pathlib import Path
-from types import SimpleNamespace
+from types import ModuleType, SimpleNamespace
 
 import gymnasium
 import pytest
@@ -90,6 +90,21 @@ def test_the_commands_take_the_world_from_a_file(cups):
     for command in commands:
         on_the_command_line(command, folder, "--tests", "1", "--trials", "5", "--jobs", "1")
     assert load_memory(folder / "cups.json").assumptions.actions == ("turn", "invert")
+
+
+def test_the_guide_to_ones_own_engine_runs_and_prints_what_it_says(tmp_path, monkeypatch, capsys):
+    pytest.importorskip("matplotlib")
+    engine, *others = blocks("your_engine.md")
+    (tmp_path / "my_engine.py").write_text(engine)
+    module = ModuleType("my_engine")
+    monkeypatch.setitem(sys.modules, "my_engine", module)
+    run(engine, "my_engine.py", variables := vars(module))
+    for code, printed in zip(others, blocks("your_engine.md", "text"), strict=True):
+        run(code, "your_engine.md", variables)
+        assert capsys.readouterr().out == printed
+    for command in blocks("your_engine.md", "sh")[0].splitlines():
+        on_the_command_line(command, tmp_path)
+    assert len(load_memory(tmp_path / "cubes.json")) == 1
 
 
 def test_the_loops_of_the_document_on_agents_run(capsys):
