@@ -179,7 +179,8 @@ def names_by_majority(found: Sequence[Recognised], made_from: dict[str, object])
 def improbable_trials(found: Sequence[Recognised]) -> list[str]:
     """Return a warning for each trial that labels drawn at random explain far better than the model does.
 
-    Trials with likelihoods in place of labels are left out: their scale is the detector's own.
+    Trials with likelihoods in place of labels are left out, for their scale is the detector's own; and those before
+    which nothing was learned, since then there is no model yet.
     """
     warnings = []
     for each in found:
@@ -187,7 +188,7 @@ def improbable_trials(found: Sequence[Recognised]) -> list[str]:
         n_labels = sum(symbol is not None for detection in record.detections for symbol in detection)
         at_random = -n_labels * math.log(record.assumptions.alphabet.n_symbols)
         soft = any(step.truth.get("likelihoods") for step in record.steps)
-        if not soft and record.steps[-1].log_evidence < at_random - WORSE_THAN_CHANCE:
+        if record.names and not soft and record.steps[-1].log_evidence < at_random - WORSE_THAN_CHANCE:
             warnings.append(
                 f"trial {each.trial.name} is less probable than labels drawn at random: something else was shown or "
                 "done (actions), or the detector erred more than usual (noise)"

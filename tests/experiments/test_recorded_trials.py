@@ -16,9 +16,9 @@ ALPHABET = PatternAlphabet.named(("label",), ("a", "b", "c", "d"), exclusive=Fal
 ASSUMPTIONS = Assumptions(3, 4, ("go", "turn"), ALPHABET)
 
 
-def recognised(log_evidence, labels=("a", None, "b")):
+def recognised(log_evidence, labels=("a", None, "b"), name="cup"):
     looks = [Evidence.of_detection(ALPHABET, (label,)) for label in labels]
-    record = TrialRecord.from_looks(ASSUMPTIONS, looks, ["go"] * (len(labels) - 1))
+    record = TrialRecord.from_looks(ASSUMPTIONS, looks, ["go"] * (len(labels) - 1), name)
     record.steps[-1] = replace(record.steps[-1], log_evidence=log_evidence)
     trial = RecordedTrial("t", tuple(RecordedLook((label,)) for label in labels), ("go",) * (len(labels) - 1))
     return Recognised(trial, record)
@@ -31,3 +31,8 @@ def test_a_trial_far_less_probable_than_labels_drawn_at_random_is_told(nats, is_
     assert [warning.startswith("trial t is less probable than labels drawn at random") for warning in found] == (
         [True] if is_told else []
     )
+
+
+def test_before_anything_was_learned_there_is_no_model_to_speak_against():
+    assert improbable_trials([recognised(-100.0, name=None)]) == []
+    assert improbable_trials([recognised(-100.0)])
