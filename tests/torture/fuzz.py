@@ -88,8 +88,8 @@ def fuzz(seconds: int, seed: int, *, keep: bool = False) -> dict[str, Any]:
             _keep_smallest(grown)
         n_corpus = sum(1 for _ in grown.iterdir())
     line = (
-        f"fuzzing: {n_runs} inputs in {time.monotonic() - begun:.0f} s, {covered} places in the code reached, {n_corpus} inputs that "
-        f"reached new ones; {len(faults)} faults"
+        f"fuzzing: {n_runs} inputs in {time.monotonic() - begun:.0f} s, {covered} places in the code reached, "
+        f"{n_corpus} inputs that reached new ones; {len(faults)} faults"
     )
     return {"line": line, "runs": n_runs, "faults": faults}
 
