@@ -1,6 +1,6 @@
 """Bags of ROS as recordings: rosbag2 (SQLite or MCAP) and ROS 1, read by the pure-Python `rosbags`, without ROS.
 
-A file of topics says where labels, actions, trials and objects are published, and in which field:
+A file of topics says where labels, actions, trials and objects are published, and in which field::
 
     {"slots": {"label": {"topic": "/detections", "label": "detections.*.results.*.hypothesis.class_id",
                          "confidence": "detections.*.results.*.hypothesis.score"}},
