@@ -67,7 +67,7 @@ MAX_PROPOSALS: Final = 4
 #: States of trials that no structure explains are merged if there are this many, and this share of all, from so many
 #: draws of so many of them: for one mode, and for more. Where a draw with one mode has most of its trials follow, there
 #: is no need for further modes.
-LEAST_UNEXPLAINED: Final = 3
+LEAST_UNEXPLAINED: Final = 6
 UNEXPLAINED_SHARE: Final = 0.1
 N_DRAWS: Final = (24, 8)
 DRAWN: Final = 16

@@ -48,7 +48,7 @@ def test_where_there_is_no_structure_none_is_believed_and_the_search_is_bounded(
     weights = [each.weight for each in learner.believed([])]
     assert sum(weights) < 0.02
     milestones = sum(is_milestone(n) for n in range(1, 16))
-    annealed, merged = milestones * 14_700, (milestones - 2) * (N_DRAWS[0] + 35 * N_DRAWS[1])
+    annealed, merged = milestones * 14_700, (milestones - 5) * (N_DRAWS[0] + 35 * N_DRAWS[1])
     assert learner.n_evaluations == annealed + merged
 
 
