@@ -32,9 +32,10 @@ class BayesFilter(FilterInference):
     _compiles: ClassVar[bool] = True
     _compiled: CompiledFilter | None = None
 
-    def _tables(self) -> RecognitionModel:
+    def make_tables(self) -> RecognitionModel:
+        """Return the tables in force when the trial begins."""
         if not (self._compiles and compilation.are_wanted()):
-            return super()._tables()
+            return super().make_tables()
         return TablesOnDemand(self.memory, self.parameters, self.prior, graphs=list(self.memory))
 
     def _begin(self) -> None:
@@ -55,32 +56,37 @@ class BayesFilter(FilterInference):
             return super().identity()
         return IdentityBelief.of(self._compiled.identity, self.model.n_unseen)
 
-    def _look(self, evidence: Evidence) -> None:
+    def update(self, evidence: Evidence) -> None:
+        """Condition on a look, the last of ``history``, and learn from it."""
         if self._compiled is None:
-            super()._look(evidence)
+            super().update(evidence)
             return
         log_probability = self._compiled.look(evidence.likelihood)
         if not math.isfinite(log_probability):
-            raise self._impossible()
-        self._log_evidence += log_probability
-        self._learn()
+            raise self.impossible_evidence()
+        self.scaled_log_evidence += log_probability
+        self.learn_from_look()
         previous, action, pattern = self.history.step(len(self.history.evidence) - 1)
         if self.parameters.learn_in_trial and pattern is not None:
             self._compiled.learn(previous, action, pattern)
 
-    def _act(self, action: AnyAction) -> None:
+    def predict(self, action: AnyAction) -> None:
+        """Predict the effect of an action, the last of ``history``."""
         if self._compiled is None:
-            super()._act(action)
+            super().predict(action)
         else:
             self._compiled.act(action)
 
-    def _expected_entropies(self) -> FloatArray:
+    def compute_expected_entropies(self) -> FloatArray:
+        """Return E[H(O | z_{t+1}, a, …)] of each action (eq. 3), nats, shape [A]."""
         if self._compiled is None:
-            return super()._expected_entropies()
+            return super().compute_expected_entropies()
         return self._compiled.expected_entropies(self.model.n_unseen)
 
-    def _propagate(self, aspects: FloatArray, action: int) -> FloatArray:
+    def propagate(self, aspects: FloatArray, action: int) -> FloatArray:
+        """Return p(X_{t+1} | O, a, z_0:t) from p(X_t | O, z_0:t), both of shape [H, W]."""
         return self.model.predict(aspects, action)
 
-    def _correct(self, aspects: FloatArray, likelihood: FloatArray) -> FloatArray:
+    def correct(self, aspects: FloatArray, likelihood: FloatArray) -> FloatArray:
+        """Return p(X_t, z_t | O, z_0:t-1), shape [H, W]."""
         return aspects * likelihood

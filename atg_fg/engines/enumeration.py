@@ -27,7 +27,7 @@ class Enumeration(Inference):
 
     name: ClassVar[str] = "enumeration"
     exact: ClassVar[bool] = True
-    _log_evidence: float = 0.0
+    scaled_log_evidence: float = 0.0
 
     def __init__(self, setup: TrialSetup) -> None:
         super().__init__(setup)
@@ -37,7 +37,7 @@ class Enumeration(Inference):
         """Return p(O | z_0:t, a_1:t) (eq. 1 and 2)."""
         return self._identity_of(self.weights)
 
-    def _smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
+    def compute_smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
         """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s."""
         weights = self.weights[hypothesis] / (self.weights[hypothesis].sum() or 1.0)
         times = range(weights.ndim)
@@ -47,21 +47,23 @@ class Enumeration(Inference):
         by_object = weights.reshape(len(weights), -1).sum(axis=1) / weights.sum()
         return IdentityBelief.of(by_object, self.model.n_unseen)
 
-    def _look(self, evidence: Evidence) -> None:
+    def update(self, evidence: Evidence) -> None:
+        """Condition on a look, the last of ``history``, and learn from it."""
         weights = self._times_last(self.weights, self.model.likelihood(evidence))
         total = weights.sum()
         if not total > 0:
-            raise self._impossible()
+            raise self.impossible_evidence()
         self.weights = weights / total
-        self._log_evidence += float(np.log(total))
-        revelation = self._learn()
+        self.scaled_log_evidence += float(np.log(total))
+        revelation = self.learn_from_look()
         if revelation is not None:
             padding = [(0, 0)] * (self.weights.ndim - 1) + [(0, self.model.n_states - self.weights.shape[-1])]
             weights = np.moveaxis(np.pad(self.weights, padding), 0, -2)  # a copy with axes [W_0, …, H, W_t]
             revelation.move(weights)
             self.weights = np.moveaxis(weights, -2, 0)
 
-    def _act(self, action: AnyAction) -> None:
+    def predict(self, action: AnyAction) -> None:
+        """Predict the effect of an action, the last of ``history``."""
         self.weights = self._extended(self.weights, action)
 
     def _extended(self, weights: FloatArray, action: AnyAction) -> FloatArray:
@@ -81,7 +83,7 @@ class Enumeration(Inference):
         past = (1,) * (weights.ndim - 2)
         return weights * likelihood.reshape(len(weights), *past, likelihood.shape[1])
 
-    def _expected_entropies(self) -> FloatArray:
+    def compute_expected_entropies(self) -> FloatArray:
         """Add every hypothetical action and then every hypothetical pattern, as eq. 3 is written.
 
         What is to come depends on the past through X_t alone, so explanations that end alike are summed first.

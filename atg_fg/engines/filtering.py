@@ -29,7 +29,7 @@ class FilterInference(Inference):
     back when the evidence turns, where a plain product would have underflowed to zero.
     """
 
-    _log_evidence: float = 0.0
+    scaled_log_evidence: float = 0.0
 
     def __init__(self, setup: TrialSetup) -> None:
         super().__init__(setup)
@@ -53,39 +53,41 @@ class FilterInference(Inference):
         """p(O, X_t | z_0:t, a_1:t), shape [H, W]."""
         return np.exp(self._belief.log_identity)[:, None] * self._belief.aspects
 
-    def _look(self, evidence: Evidence) -> None:
+    def update(self, evidence: Evidence) -> None:
+        """Condition on a look, the last of ``history``, and learn from it."""
         self._condition(self.model.likelihood(evidence))
-        revelation = self._learn()
+        revelation = self.learn_from_look()
         if revelation is not None:
             aspects = widened(self._state.aspects, self.model.n_states)
             revelation.move(aspects)
             self._state = FilterState(self._state.log_identity, aspects)
 
     def _condition(self, likelihood: FloatArray) -> None:
-        joint = self._correct(self._state.aspects, likelihood)
+        joint = self.correct(self._state.aspects, likelihood)
         given_object = joint.sum(axis=1)
         possible = given_object > 0
         log_joint = self._state.log_identity + log_of(given_object)
         peak = log_joint.max()
         if not np.isfinite(peak):
-            raise self._impossible()
+            raise self.impossible_evidence()
         log_probability = float(peak + np.log(np.exp(log_joint - peak).sum()))
         aspects = joint / np.where(possible, given_object, 1.0)[:, None]
         if not possible.all():
             # A hypothesis that is ruled out keeps its prediction; its weight is zero from here on.
             aspects[~possible] = self._state.aspects[~possible]
         self._state = FilterState(log_joint - log_probability, aspects)
-        self._log_evidence += log_probability
+        self.scaled_log_evidence += log_probability
 
-    def _act(self, action: AnyAction) -> None:
+    def predict(self, action: AnyAction) -> None:
+        """Predict the effect of an action, the last of ``history``."""
         before = self._state.aspects
-        aspects = mixed(action, lambda index: self._propagate(before, index), before)
+        aspects = mixed(action, lambda index: self.propagate(before, index), before)
         self._state = FilterState(self._state.log_identity, aspects)
 
     @abstractmethod
-    def _propagate(self, aspects: FloatArray, action: int) -> FloatArray:
+    def propagate(self, aspects: FloatArray, action: int) -> FloatArray:
         """Return p(X_{t+1} | O, a, z_0:t) from p(X_t | O, z_0:t), both of shape [H, W]."""
 
     @abstractmethod
-    def _correct(self, aspects: FloatArray, likelihood: FloatArray) -> FloatArray:
+    def correct(self, aspects: FloatArray, likelihood: FloatArray) -> FloatArray:
         """Return p(X_t, z_t | O, z_0:t-1), shape [H, W]."""

@@ -80,7 +80,8 @@ class GibbsSampling(WholeTrialInference):
         _ = self.posterior
         return self._report
 
-    def _solve(self, chain: Chain) -> Posterior:
+    def solve(self, chain: Chain) -> Posterior:
+        """Return the posterior of a chain whose likelihoods are at most one."""
         rng = self._generator(0)
         past = forward_pass(chain)
         proposal = self._proposal(chain)
@@ -128,7 +129,7 @@ class GibbsSampling(WholeTrialInference):
         moved = objects != before
         return objects[self.n_burn_in :], float(moved.sum() / others.sum()) if others.any() else 1.0
 
-    def _smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
+    def compute_smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
         """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s from paths drawn given the object."""
         chain, _ = self.chain(hypothesis).scaled()
         past = forward_pass(chain)

@@ -43,7 +43,7 @@ class GtsamElimination(FilterInference):
         """Return the whole factor graph of the trial so far, with O, X0 … Xt."""
         return RecognitionGraph(self.chain(), n_unseen=self.model.n_unseen)
 
-    def _smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
+    def compute_smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
         """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s, from the graph given O."""
         graph = RecognitionGraph(self.chain(hypothesis), n_unseen=1)
         try:
@@ -53,13 +53,13 @@ class GtsamElimination(FilterInference):
 
     # Tables that do not change within the trial are made into factors once.
 
-    def _propagate(self, aspects: FloatArray, action: int) -> FloatArray:
+    def propagate(self, aspects: FloatArray, action: int) -> FloatArray:
         """Multiply the belief by the transition factor and sum X_t out."""
         if action not in self._transitions or self.parameters.learn_in_trial:
             self._transitions[action] = TransitionFactors(self.model, action)
         return self._transitions[action].next_aspects(aspects)
 
-    def _correct(self, aspects: FloatArray, likelihood: FloatArray) -> FloatArray:
+    def correct(self, aspects: FloatArray, likelihood: FloatArray) -> FloatArray:
         """Multiply the prediction by the observation factor; (O, X_t) is one variable, since neither is summed out."""
         states = self.model.states
         predicted = factors.factor([_STATE], aspects.ravel()[states])
@@ -68,7 +68,7 @@ class GtsamElimination(FilterInference):
         joint.ravel()[states] = factors.vector(predicted * observation, len(states))
         return joint
 
-    def _expected_entropies(self) -> FloatArray:
+    def compute_expected_entropies(self) -> FloatArray:
         """Return eq. 3, with p(O, z | a) as it is left by eliminating X_t."""
         if self._hypothetical is None or self.parameters.learn_in_trial:
             self._hypothetical = HypotheticalFactors(self.model)

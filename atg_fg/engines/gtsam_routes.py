@@ -98,7 +98,8 @@ class GtsamRoute(WholeTrialInference):
             )
         return factors.ordering(order)
 
-    def _solve(self, chain: Chain) -> Posterior:
+    def solve(self, chain: Chain) -> Posterior:
+        """Return the posterior of a chain whose likelihoods are at most one."""
         graph = RecognitionGraph(chain, self.model.n_unseen)
         identity = np.zeros(len(chain.prior))
         if graph.is_held:
@@ -111,7 +112,7 @@ class GtsamRoute(WholeTrialInference):
         identity = identity / identity.sum()
         return Posterior(identity, joint_of(identity, joint), graph.log_evidence())
 
-    def _smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
+    def compute_smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
         """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s, from the graph given O."""
         chain = self.chain(hypothesis).scaled()[0].balanced()[0]
         graph = RecognitionGraph(chain, n_unseen=1)

@@ -78,16 +78,18 @@ class LearnedStructure(BayesFilter):
         unusual = self.model.prior if self.prior is not None else None
         self._followed += [FollowedChain(each, memory, log_erring, unusual) for each in chains]
 
-    def _look(self, evidence: Evidence) -> None:
-        super()._look(evidence)
+    def update(self, evidence: Evidence) -> None:
+        """Condition on a look, the last of ``history``, and learn from it."""
+        super().update(evidence)
         for each in self._followed:
             each.observe(evidence)
         if self._followed:
             least = self.log_evidence - self._log_scale + np.log(RULED_OUT)
             self._followed = [each for each in self._followed if log_sum_exp(each.log_joint) > least]
 
-    def _act(self, action: AnyAction) -> None:
-        super()._act(action)
+    def predict(self, action: AnyAction) -> None:
+        """Predict the effect of an action, the last of ``history``."""
+        super().predict(action)
         for each in self._followed:
             each.filter.act(action)
 
@@ -156,7 +158,7 @@ class LearnedStructure(BayesFilter):
 
     def _log_joints(self) -> list[FloatArray]:
         """Return ln p(O, type, z_0:t | a_1:t) of being plain, then of following each structure, each of shape [H]."""
-        plain = self._log_plain + self._belief.log_identity + self._log_evidence
+        plain = self._log_plain + self._belief.log_identity + self.scaled_log_evidence
         return [plain, *(each.log_joint for each in self._followed)]
 
     def _type_beliefs(self) -> list[FloatArray]:
@@ -221,16 +223,16 @@ class LearnedStructure(BayesFilter):
             self.model, self._plain_aspects(beliefs), following, self.memory.assumptions.alphabet.symbols
         )
 
-    def _expected_entropies(self) -> FloatArray:
+    def compute_expected_entropies(self) -> FloatArray:
         """Return eq. 3 for each action, shape [A], from p(O, z | a) summed over types, poses and contents."""
-        return self.belief_tree().expected_entropies() if self._followed else super()._expected_entropies()
+        return self.belief_tree().expected_entropies() if self._followed else super().compute_expected_entropies()
 
-    def _smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
+    def compute_smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
         """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s, of plain ATGs and poses together.
 
         A pose counts as the aspect that shows the pose's pattern, or as the collection node if none does.
         """
-        marginals = super()._smoothed_aspects(hypothesis)
+        marginals = super().compute_smoothed_aspects(hypothesis)
         weights = [float(belief[hypothesis]) for belief in self._type_beliefs()]
         if not sum(weights[1:]) > 0:
             return marginals

@@ -79,7 +79,8 @@ class LoopyBeliefPropagation(WholeTrialInference):
         _ = self.posterior
         return self._report
 
-    def _solve(self, chain: Chain) -> Posterior:
+    def solve(self, chain: Chain) -> Posterior:
+        """Return the posterior of a chain whose likelihoods are at most one."""
         is_tree = len(chain.prior) == 1 or not chain.transitions
         messages = Messages(chain, damping=0.0 if is_tree else self.damping)
         sweep = messages.sweep if self.schedule == "sequential" else messages.flood
@@ -93,7 +94,7 @@ class LoopyBeliefPropagation(WholeTrialInference):
         joint = joint_of(identity, messages.aspects(len(chain.transitions)))
         return Posterior(identity, joint, messages.log_evidence())
 
-    def _smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
+    def compute_smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
         """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s from the beliefs of the factors."""
         _ = self.posterior
         assert self._messages is not None

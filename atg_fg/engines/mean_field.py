@@ -72,7 +72,7 @@ class MeanField(SupportedInference):
 
     name: ClassVar[str] = "mean-field"
     exact: ClassVar[bool] = False
-    _log_evidence: float = 0.0
+    scaled_log_evidence: float = 0.0
 
     def __init__(
         self,
@@ -101,7 +101,8 @@ class MeanField(SupportedInference):
         """q(O) q(X_t), shape [H, W]; after an action, what the next look finds."""
         return self._predicted.copy() if self.history.awaits_evidence else np.outer(self.objects, self.aspects)
 
-    def _look(self, evidence: Evidence) -> None:
+    def update(self, evidence: Evidence) -> None:
+        """Condition on a look, the last of ``history``, and learn from it."""
         likelihood = self.model.likelihood(evidence)
         self._check_possible(likelihood)
         # Only the greatest weight matters for the floor, so evidence on any scale is brought to one.
@@ -110,15 +111,16 @@ class MeanField(SupportedInference):
         self.objects, self.aspects, self.report = factorised(
             weights, self.floor, max_iterations=self.max_iterations, tolerance=self.tolerance
         )
-        self._log_evidence += float(np.log(scale)) - self.report.free_energy
-        revelation = self._learn()
+        self.scaled_log_evidence += float(np.log(scale)) - self.report.free_energy
+        revelation = self.learn_from_look()
         if revelation is not None:
             mass = np.outer(self.objects, self.aspects)
             mass = np.pad(mass, ((0, 0), (0, self.model.n_states - mass.shape[1])))
             revelation.move(mass)
             self.aspects = mass.sum(axis=0)
 
-    def _act(self, action: AnyAction) -> None:
+    def predict(self, action: AnyAction) -> None:
+        """Predict the effect of an action, the last of ``history``."""
         self._predicted = self.objects[:, None] * (self.aspects @ self._predict_support(action))
 
 

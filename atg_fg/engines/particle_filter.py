@@ -49,7 +49,7 @@ class ParticleFilter(SupportedInference):
 
     name: ClassVar[str] = "particle"
     exact: ClassVar[bool] = False
-    _log_evidence: float = 0.0
+    scaled_log_evidence: float = 0.0
 
     def __init__(
         self,
@@ -91,18 +91,19 @@ class ParticleFilter(SupportedInference):
         predicted: FloatArray = np.matmul(mass[:, None, :], self._transition)[:, 0, :]
         return predicted
 
-    def _look(self, evidence: Evidence) -> None:
+    def update(self, evidence: Evidence) -> None:
+        """Condition on a look, the last of ``history``, and learn from it."""
         likelihood = self.model.likelihood(evidence)
         self._check_possible(likelihood)
         self._condition(likelihood)
-        revelation = self._learn()
+        revelation = self.learn_from_look()
         if revelation is not None:
             self._divide(revelation)
 
     def _condition(self, likelihood: FloatArray) -> None:
         if self._transition is None:
             self._draw(self.model.prior[:, None] * self.model.base_row * (likelihood / likelihood.max()))
-            self._log_evidence += float(np.log(likelihood.max()))
+            self.scaled_log_evidence += float(np.log(likelihood.max()))
             return
         # p(x_t, z_t | x_{t-1}, a_t, o) of every state, shape [H, W, W]
         greatest = likelihood.max()
@@ -112,7 +113,7 @@ class ParticleFilter(SupportedInference):
         if not total > 0:
             self._rejuvenate(likelihood)
             return
-        self._log_evidence += float(np.log(total) + np.log(greatest))
+        self.scaled_log_evidence += float(np.log(total) + np.log(greatest))
         alive = weights > 0
         rows = proposal[self.objects[alive], self.aspects[alive]]
         aspects = self.aspects.copy()
@@ -131,7 +132,8 @@ class ParticleFilter(SupportedInference):
         moves = (self.aspects == COLLECTION) & (chance < share[self.objects])
         self.aspects = np.where(moves, state[self.objects], self.aspects)
 
-    def _act(self, action: AnyAction) -> None:
+    def predict(self, action: AnyAction) -> None:
+        """Predict the effect of an action, the last of ``history``."""
         self._transition = self._predict_support(action)
 
     def _draw(self, mass: FloatArray) -> None:
@@ -140,7 +142,7 @@ class ParticleFilter(SupportedInference):
         cells = self._rng.choice(mass.size, self.n_particles, p=mass.ravel() / total)
         self.objects, self.aspects = (index.astype(np.int64) for index in np.unravel_index(cells, mass.shape))
         self.weights = np.full(self.n_particles, 1.0 / self.n_particles)
-        self._log_evidence += float(np.log(total))
+        self.scaled_log_evidence += float(np.log(total))
 
     def _rejuvenate(self, likelihood: FloatArray) -> None:
         """Draw all particles anew from the exact one-step prior times the likelihood."""
@@ -155,7 +157,7 @@ class ParticleFilter(SupportedInference):
         logarithms = log_prior + log_of(total)
         log_probability = log_sum_exp(logarithms)
         self._draw(np.exp(logarithms - log_probability)[:, None] * given / np.where(total > 0, total, 1.0)[:, None])
-        self._log_evidence += log_probability
+        self.scaled_log_evidence += log_probability
         self.rejuvenations += 1
 
     def _resample(self) -> None:

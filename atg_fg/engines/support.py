@@ -29,12 +29,12 @@ class SupportedInference(Inference):
         """Condition the support on a look by p(z | x, i), shape [H, W]; raise before any change if it is impossible."""
         support = self.support & (likelihood > 0)
         if not support.any():
-            raise self._impossible()
+            raise self.impossible_evidence()
         self.support = support
 
-    def _learn(self) -> Revelation | None:
+    def learn_from_look(self) -> Revelation | None:
         """Let the tables and the support learn from the last look; return how the belief is to be divided, if so."""
-        revelation = super()._learn()
+        revelation = super().learn_from_look()
         if revelation is not None:
             mass = np.pad(self.support.astype(np.float64), ((0, 0), (0, self.model.n_states - self.support.shape[1])))
             revelation.move(mass)

@@ -50,7 +50,7 @@ class WholeTrialInference(SupportedInference):
         return IdentityBelief.of(probabilities, self.model.n_unseen)
 
     @property
-    def _log_evidence(self) -> float:
+    def scaled_log_evidence(self) -> float:
         """Return ln p(z_0:t | a_1:t), or what the engine takes it to be."""
         return self.posterior.log_evidence
 
@@ -64,20 +64,22 @@ class WholeTrialInference(SupportedInference):
 
     def _solve_scaled(self) -> Posterior:
         chain, log_scale = self.chain().scaled()
-        identity, joint, log_evidence = self._solve(chain)
+        identity, joint, log_evidence = self.solve(chain)
         return Posterior(identity, joint, log_evidence + log_scale)
 
-    def _look(self, evidence: Evidence) -> None:
+    def update(self, evidence: Evidence) -> None:
+        """Condition on a look, the last of ``history``, and learn from it."""
         self._check_possible(self.model.likelihood(evidence))
-        self._learn()
+        self.learn_from_look()
         self._posterior = None
 
-    def _act(self, action: AnyAction) -> None:
+    def predict(self, action: AnyAction) -> None:
+        """Predict the effect of an action, the last of ``history``."""
         self._predict_support(action)
         self._posterior = None
 
     @abstractmethod
-    def _solve(self, chain: Chain) -> Posterior:
+    def solve(self, chain: Chain) -> Posterior:
         """Return the posterior of a chain whose likelihoods are at most one."""
 
 

@@ -45,9 +45,10 @@ class Inference(ABC):
 
     A subclass is an engine. It says by ``exact`` whether its posteriors are those of the model, and by
     ``knows_structure`` whether it can let objects follow a structure that all share. It answers ``identity`` and
-    ``_log_evidence``, and fills the hooks ``_look`` and ``_act``; it may have a way of its own to
-    ``_expected_entropies`` and ``_smoothed_aspects``. Hooks are called once what was asked is known to make sense.
-    Options of an engine are keyword-only arguments of its constructor.
+    ``scaled_log_evidence``, and fills the hooks ``update`` and ``predict``; it may have a way of its own to
+    ``compute_expected_entropies`` and ``compute_smoothed_aspects``. These hooks are for subclasses: whoever uses an
+    engine calls ``observe``, ``act`` and ``expected_entropies``, which check what they are given first. Options of an
+    engine are keyword-only arguments of its constructor.
 
     What an engine hands out cannot change it: arrays in public attributes are made read-only after each step, so an
     engine replaces them rather than write to them. A copy, shallow or deep, shares nothing with the engine.
@@ -70,11 +71,11 @@ class Inference(ABC):
 
     def __init__(self, setup: TrialSetup) -> None:
         self.memory, self.parameters, self.prior = setup
-        self.model = self._tables()
+        self.model = self.make_tables()
         self.history = History()
         self._log_scale = 0.0
 
-    def _tables(self) -> RecognitionModel:
+    def make_tables(self) -> RecognitionModel:
         """Return the tables in force when the trial begins; an engine that does without some of them overrides this."""
         return RecognitionModel(self.memory, self.parameters, self.prior)
 
@@ -117,7 +118,7 @@ class Inference(ABC):
         before = copy(self)
         self.history.actions.append(NOTHING)
         try:
-            self._act(NOTHING)
+            self.predict(NOTHING)
             self._take_in(evidence)
         except BaseException:
             vars(self).update(vars(before))
@@ -141,7 +142,7 @@ class Inference(ABC):
         evidence, log_scale = evidence.scaled()
         self.history.evidence.append(evidence)
         try:
-            self._look(evidence)
+            self.update(evidence)
         except BaseException:
             self.history.evidence.pop()
             raise
@@ -166,7 +167,7 @@ class Inference(ABC):
     def _do(self, action: AnyAction) -> None:
         self.history.actions.append(action)
         try:
-            self._act(action)
+            self.predict(action)
         except BaseException:
             self.history.actions.pop()
             raise
@@ -195,7 +196,7 @@ class Inference(ABC):
             InvalidInputError: Asked before a look or between an action and its look.
         """
         self._check_looked("expected entropy")
-        return self._expected_entropies()
+        return self.compute_expected_entropies()
 
     def belief_table(self, shown: int = SHOWN) -> BeliefTable:
         """Return p(O | z_0:t, a_1:t) with the names of the objects, as a table that a notebook shows.
@@ -239,7 +240,7 @@ class Inference(ABC):
         if self.history.awaits_evidence:
             raise InvalidInputError(f"{asked}: asked before the look; expected an observation first")
 
-    def _impossible(self) -> ImpossibleEvidenceError:
+    def impossible_evidence(self) -> ImpossibleEvidenceError:
         """Return the error for the last look, if no hypothesis allows it."""
         return ImpossibleEvidenceError(
             f"observation {len(self.history.evidence) - 1}: the evidence has probability zero under the model; "
@@ -253,11 +254,11 @@ class Inference(ABC):
     @property
     def log_evidence(self) -> float:
         """Return ln p(z_0:t | a_1:t)."""
-        return self._log_evidence + self._log_scale
+        return self.scaled_log_evidence + self._log_scale
 
     @property
     @abstractmethod
-    def _log_evidence(self) -> float:
+    def scaled_log_evidence(self) -> float:
         """Ln p(z_0:t | a_1:t) of the evidence in ``history``, or what the engine takes it to be."""
 
     @property
@@ -293,7 +294,7 @@ class Inference(ABC):
             raise ImpossibleEvidenceError(
                 f"smoothed aspects: hypothesis {hypothesis} has prior probability zero; expected one that is possible"
             )
-        marginals = self._smoothed_aspects(hypothesis)
+        marginals = self.compute_smoothed_aspects(hypothesis)
         if not all(marginal.sum() > 0 for marginal in marginals):
             raise ImpossibleEvidenceError(
                 f"smoothed aspects: the evidence has probability zero under hypothesis {hypothesis}; "
@@ -301,35 +302,35 @@ class Inference(ABC):
             )
         return marginals
 
-    def _learn(self) -> Revelation | None:
+    def learn_from_look(self) -> Revelation | None:
         """Let the tables learn from the last look; return how belief in collection nodes is to be divided, if so."""
         return self.model.learn_from(self.history, len(self.history.evidence) - 1)
 
     @abstractmethod
-    def _look(self, evidence: Evidence) -> None:
+    def update(self, evidence: Evidence) -> None:
         """Condition on a look, the last of ``history``, and learn from it.
 
-        An engine that keeps a belief divides that of the collection nodes as ``_learn`` returns it.
+        An engine that keeps a belief divides that of the collection nodes as ``learn_from_look`` returns it.
 
         Raises:
-            ImpossibleEvidenceError: The look is impossible (``_impossible``); raised before any change.
+            ImpossibleEvidenceError: The look is impossible (``impossible_evidence``); raised before any change.
         """
 
     @abstractmethod
-    def _act(self, action: AnyAction) -> None:
+    def predict(self, action: AnyAction) -> None:
         """Predict the effect of an action, the last of ``history``; if this raises, nothing has changed.
 
         ``mixed`` (``atg_fg.core.actions``) makes a prediction for a sure action one for an action that is not.
         """
 
-    def _expected_entropies(self) -> FloatArray:
+    def compute_expected_entropies(self) -> FloatArray:
         """Return E[H(O | z_{t+1}, a, …)] of each action (eq. 3) in nats, shape [A]; called after a look.
 
         It is exact for the engine's own ``aspect_belief``; an engine with a way of its own overrides this.
         """
         return expected_entropies_of(self.model, self.aspect_belief)
 
-    def _smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
+    def compute_smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
         """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s, each of shape [W_s], or zeros.
 
         Called after the first look, for a hypothesis whose prior probability is above zero. It is exact, by

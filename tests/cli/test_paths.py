@@ -22,7 +22,7 @@ OUTPUTS = {
     "demo": {"json_file", "output"},
     "doctor": {"json_file"},
     "engines check": {"json_file"},
-    "engines compare": {"json_file"},
+    "engines compare": {"json_file", "plot"},
     "explain": {"json_file"},
     "figure3": {"json_file", "log", "csv_file", "plot"},
     "goal": {"json_file", "records", "video"},

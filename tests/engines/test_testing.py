@@ -26,41 +26,41 @@ class Plain(FilterInference):
     name = "plain"
     exact = True
 
-    def _propagate(self, aspects, action):
+    def propagate(self, aspects, action):
         return self.model.predict(aspects, action)
 
-    def _correct(self, aspects, likelihood):
+    def correct(self, aspects, likelihood):
         return aspects * likelihood
 
 
 class Sharper(Plain):
-    def _correct(self, aspects, likelihood):
+    def correct(self, aspects, likelihood):
         return aspects * likelihood**1.001
 
 
 class Forgetful(Plain):
-    def _propagate(self, aspects, action):
+    def propagate(self, aspects, action):
         return aspects
 
 
 class Unscaled(Plain):
     @property
-    def _log_evidence(self):
+    def scaled_log_evidence(self):
         return -1.0
 
-    @_log_evidence.setter
-    def _log_evidence(self, value):
+    @scaled_log_evidence.setter
+    def scaled_log_evidence(self, value):
         pass
 
 
 class Careless(Plain):
-    def _expected_entropies(self):
+    def compute_expected_entropies(self):
         return np.zeros(self.model.n_actions)
 
 
 class Blurred(Plain):
-    def _smoothed_aspects(self, hypothesis):
-        return [np.full(len(each), 1 / len(each)) for each in super()._smoothed_aspects(hypothesis)]
+    def compute_smoothed_aspects(self, hypothesis):
+        return [np.full(len(each), 1 / len(each)) for each in super().compute_smoothed_aspects(hypothesis)]
 
 
 class Restless(Plain):
@@ -131,7 +131,7 @@ def test_a_fault_is_found_and_said(engine, message):
 def test_what_is_no_engine_is_refused():
     with pytest.raises(InvalidInputError, match=r"expected a subclass of atg_fg\.inference\.interface\.Inference"):
         check_engine("json:JSONDecoder")
-    with pytest.raises(InvalidInputError, match=r"does not define .*_act"):
+    with pytest.raises(InvalidInputError, match=r"does not define .*predict"):
         check_engine("atg_fg.inference.interface:Inference")
     with pytest.raises(UnknownNameError, match="engine: unknown name 'magic'"):
         check_engine("magic")

@@ -70,8 +70,8 @@ class Hasty(BayesFilter):
     name = "hasty"
     exact = False
 
-    def _expected_entropies(self):
-        return np.array([0.0, *super()._expected_entropies()[1:]])
+    def compute_expected_entropies(self):
+        return np.array([0.0, *super().compute_expected_entropies()[1:]])
 
 
 @pytest.fixture

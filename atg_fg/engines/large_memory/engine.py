@@ -87,7 +87,8 @@ class LargeMemory(Inference):
         self._is_matched = np.zeros(len(self.memory), dtype=bool)
         self._class_of = self._classes.rows_of(self._compact.n_known).astype(np.int32)
 
-    def _tables(self) -> TablesOnDemand:
+    def make_tables(self) -> TablesOnDemand:
+        """Return the tables in force when the trial begins."""
         return TablesOnDemand(self.memory, self.parameters, self.prior, max_cells=MAX_CELLS)
 
     def _filter_of(self, objects: IntArray, *, unseen: bool = False) -> AspectFilter:
@@ -103,7 +104,8 @@ class LargeMemory(Inference):
     def _filters(self) -> list[AspectFilter]:
         return [self._matched] if self._classes is None else [self._matched, self._classes.filter]
 
-    def _look(self, evidence: Evidence) -> None:
+    def update(self, evidence: Evidence) -> None:
+        """Condition on a look, the last of ``history``, and learn from it."""
         time = len(self.history.evidence) - 1
         objects = self._first_matches(evidence)
         filters = [self._matched]
@@ -120,7 +122,7 @@ class LargeMemory(Inference):
             log_weights.append(classes.log_of_classes(of_classes.log_weight, members))
         log_total = log_sum_exp(np.concatenate(log_weights))
         if not np.isfinite(log_total):
-            raise self._impossible()
+            raise self.impossible_evidence()
         # From here on nothing is refused any more.
         for each, after in zip(filters, looked, strict=True):
             each.accept(after)
@@ -133,7 +135,7 @@ class LargeMemory(Inference):
                 self._matched.absorb(joining)
         self._log_total = log_total
         self._decision = None
-        self._learn()
+        self.learn_from_look()
         for each in self._filters():
             each.learn_from(self.history, time)
 
@@ -148,7 +150,8 @@ class LargeMemory(Inference):
         first: IntArray = objects[~self._is_matched[objects]]
         return first
 
-    def _act(self, action: AnyAction) -> None:
+    def predict(self, action: AnyAction) -> None:
+        """Predict the effect of an action, the last of ``history``."""
         if isinstance(action, UncertainAction):
             if action.chances:
                 raise InvalidInputError("engine 'large-memory': an action that is not sure; expected one that is")
@@ -203,11 +206,12 @@ class LargeMemory(Inference):
         return self._decide().fell_back
 
     @property
-    def _log_evidence(self) -> float:
+    def scaled_log_evidence(self) -> float:
         """Return ln p(z_0:t | a_1:t); the other objects' part of p(z) is off by at most ``total_variation_bound``."""
         return self._log_total
 
-    def _expected_entropies(self) -> FloatArray:
+    def compute_expected_entropies(self) -> FloatArray:
+        """Return E[H(O | z_{t+1}, a, …)] of each action (eq. 3), nats, shape [A]."""
         return self._decide().expected.copy()
 
     def _decide(self) -> Decision:
@@ -263,7 +267,7 @@ class LargeMemory(Inference):
                 joint[number, : len(aspects)] = aspects[: joint.shape[1]]
         return joint
 
-    def _smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
+    def compute_smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
         """Return p(X_s | O = hypothesis, z_0:t, a_1:t) for every time s by forward-backward on that object alone."""
         known = hypothesis < len(self._compact)
         alone = RobotMemory(self.memory.assumptions, [self._compact.graph(hypothesis)] if known else [])
