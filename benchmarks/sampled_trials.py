@@ -17,9 +17,10 @@ from rich.table import Table
 
 from atg_fg.core.records import TrialRecord
 from atg_fg.experiments.table1 import TestPlan, run_test
-from atg_fg.learning.chain import Chain, Structure, Task
+from atg_fg.learning.chain import Chain
 from atg_fg.learning.detector_noise import DetectorNoise
 from atg_fg.learning.raw_trials import Recording
+from atg_fg.learning.sampling_task import Structure, Task
 from atg_fg.storage.presets import preset
 
 NOISE = {"wrong": 0.1, "missing": 0.1}

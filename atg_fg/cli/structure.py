@@ -18,8 +18,8 @@ from atg_fg.display import figures
 from atg_fg.display.completed_picture import draw_completed_atg, probability_text
 from atg_fg.display.structure_picture import draw_structure
 from atg_fg.display.structure_words import action_text, register_names
+from atg_fg.learning.believed_structure import BelievedStructure
 from atg_fg.learning.completion import CompletedGraph, completed_atg, statuses
-from atg_fg.learning.learner import BelievedStructure
 from atg_fg.learning.predictive_checks import summary_of_evidence
 from atg_fg.learning.shared_structure import SharedStructure
 from atg_fg.learning.structured_memory import StructuredMemory

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from atg_fg.core.checks import brief, distinct_names, whole_number
 from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.slot_checks import check_confidences, check_slots
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
@@ -304,7 +305,7 @@ class Evidence:
             InvalidInputError: Anything does not fit the alphabet, or no pattern is possible.
         """
         hard = cls.of_detection(alphabet, detection or (None,) * len(alphabet.slots), confidences)
-        slots = check_slots(likelihoods, alphabet)
+        slots = check_slots(likelihoods, alphabet.slots, alphabet.n_symbols)
         product = hard.likelihood.copy()
         for slot, weights in enumerate(slots):
             if weights is not None:
@@ -363,47 +364,3 @@ class Evidence:
         if greatest and not LEAST_SHARE <= greatest <= 1 / LEAST_SHARE:
             return replace(self, likelihood=weights / greatest), math.log(greatest)
         return (self if weights is self.likelihood else replace(self, likelihood=weights)), 0.0
-
-
-def check_slots(
-    likelihoods: Sequence[ArrayLike | None], alphabet: PatternAlphabet, place: str = "likelihoods"
-) -> SlotLikelihoods:
-    """Return likelihoods of each slot's symbols as tuples, or raise ``InvalidInputError`` naming ``place``.
-
-    None at all are as good.
-    """
-    if len(likelihoods) not in (0, len(alphabet.slots)):
-        raise InvalidInputError(
-            f"{place}: {len(likelihoods)}; expected one for each of {len(alphabet.slots)} slots, or none"
-        )
-    result: list[tuple[float, ...] | None] = []
-    for slot, given in zip(alphabet.slots, likelihoods, strict=False):
-        if given is None:
-            result.append(None)
-            continue
-        where = f"{place}, slot {slot!r}"
-        try:
-            weights = np.array(given, dtype=np.float64)
-        except (TypeError, ValueError) as error:
-            raise InvalidInputError(f"{where}: {brief(given)}; expected numbers") from error
-        if weights.shape != (alphabet.n_symbols,):
-            raise InvalidInputError(
-                f"{where}: shape {weights.shape}; expected a weight for each of {alphabet.n_symbols} symbols"
-            )
-        if not (weights.min() >= 0 and 0 < weights.sum() < np.inf):  # a NaN is neither
-            raise InvalidInputError(
-                f"{where}: {brief(weights.tolist())}; expected finite ones of at least 0, not all 0"
-            )
-        result.append(tuple(weights.tolist()))
-    return tuple(result)
-
-
-def check_confidences(confidences: Sequence[float | None], n_slots: int, place: str = "confidences") -> Confidences:
-    """Return confidences as a tuple, or raise ``InvalidInputError`` naming ``place``; none at all are as good."""
-    if len(confidences) not in (0, n_slots):
-        raise InvalidInputError(f"{place}: {len(confidences)}; expected one for each of {n_slots} slots, or none")
-    for value in confidences:
-        is_number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
-        if value is not None and not (is_number and math.isfinite(value)):
-            raise InvalidInputError(f"{place}: {brief(value)}; expected finite numbers or null")
-    return tuple(None if value is None else float(value) for value in confidences)

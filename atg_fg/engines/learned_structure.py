@@ -24,9 +24,9 @@ from atg_fg.inference.belief_tree import BeliefNode
 from atg_fg.inference.chain import forward_backward
 from atg_fg.inference.interface import TrialSetup
 from atg_fg.inference.recognition_model import COLLECTION
+from atg_fg.learning.believed_structure import BelievedStructure
 from atg_fg.learning.completion import pose_graph
 from atg_fg.learning.evidence_learner import BelievedChain
-from atg_fg.learning.learner import BelievedStructure
 from atg_fg.learning.path_filter import PathFilter
 from atg_fg.learning.pose_belief_tree import Following, StructureBelief
 from atg_fg.learning.pose_chain import pose_chain, pose_patterns

@@ -10,17 +10,18 @@ import numpy as np
 
 from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.learning import gibbs_kernels, kernels
-from atg_fg.learning.chain import Chain, Structure, Task
+from atg_fg.learning.chain import Chain
+from atg_fg.learning.milestones import is_milestone
 from atg_fg.learning.populations import (
     HOPELESS,
     Conclusion,
     Population,
-    is_milestone,
     log_mean,
     objects_by_label,
     votes_by_name,
 )
 from atg_fg.learning.raw_trials import Recording
+from atg_fg.learning.sampling_task import Structure, Task
 from atg_fg.learning.saved_chain import SavedChain
 
 #: Chains of automata, their sweeps a trial, and how much their scores are tempered: these are means over few sweeps.

@@ -12,7 +12,7 @@ import numpy as np
 from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.patterns import FloatArray, PatternAlphabet
 from atg_fg.inference.known_transitions import TransitionGraph
-from atg_fg.learning.learner import BelievedStructure
+from atg_fg.learning.believed_structure import BelievedStructure
 from atg_fg.learning.rates import Rates
 from atg_fg.learning.register_contents import symbol_probabilities
 from atg_fg.learning.shared_structure import Poses

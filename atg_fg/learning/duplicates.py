@@ -30,7 +30,8 @@ from atg_fg.core.log_math import log_of
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import FloatArray
-from atg_fg.learning.learner import BelievedStructure, StructureLearner
+from atg_fg.learning.believed_structure import BelievedStructure
+from atg_fg.learning.learner import StructureLearner
 from atg_fg.learning.likelihood import score_trials
 from atg_fg.learning.structured_memory import StructuredMemory
 

@@ -29,8 +29,9 @@ LEAST_WEIGHT: Final = 1e-3
 
 # Compiled code takes longer to load than all else, so it is loaded where it is used.
 if TYPE_CHECKING:
-    from atg_fg.learning.chain import Chain, Task
+    from atg_fg.learning.chain import Chain
     from atg_fg.learning.populations import Population
+    from atg_fg.learning.sampling_task import Task
 
 
 class BelievedChain(NamedTuple):
@@ -266,7 +267,7 @@ class EvidenceLearner:
         return RegisterPopulation(n_slots, n_actions, alphabet.n_symbols)
 
     def _task(self, trials: Sequence[RawTrial], noise: DetectorNoise) -> Task:
-        from atg_fg.learning.chain import Task
+        from atg_fg.learning.sampling_task import Task
 
         recording = Recording.of(trials, self.assumptions.alphabet.n_symbols)
         return Task.of(recording, noise, self.assumptions.n_objects)

@@ -9,25 +9,23 @@ nothing to be found.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import TooLargeError
 from atg_fg.core.patterns import FloatArray
+from atg_fg.learning.believed_structure import BelievedStructure
 from atg_fg.learning.candidate import Candidate
 from atg_fg.learning.kinds import choose_kinds, kind_table, share_kinds
 from atg_fg.learning.likelihood import plain_log_evidence
+from atg_fg.learning.milestones import is_milestone
 from atg_fg.learning.rates import Rates, Tally, estimate_rates
 from atg_fg.learning.raw_trials import RawTrial
 from atg_fg.learning.search import SearchPlan, propose_structures
 from atg_fg.learning.shared_structure import SharedStructure
 from atg_fg.learning.state_merging import merge_states, mode_automata
-
-#: Up to so many trials each is a milestone; from there on the number grows by a quarter from one to the next.
-DENSE_MILESTONES: Final = 8
-
 
 #: A structure is settled if it is this many nats better than none.
 SETTLED_GAIN: Final = 50.0
@@ -41,22 +39,16 @@ DOUBTFUL_ERRORS: Final = 0.02
 #: however much it explains: the same mistakes come again with the same object, and a new object, whose mistakes are
 #: accidents as well, explains them as well as the right one. So many errors more are forgiven, for the first trials.
 MAX_WRONG: Final = 0.02
-
-
 FORGIVEN: Final = 2.0
 
 
 #: Structures that are believed in at once, and how many nats the others may be behind the best.
 MAX_BELIEVED: Final = 3
-
-
 BELIEVED_WITHIN: Final = 7.0
 
 
 #: Structures that are kept up, and how many nats they may be behind the best.
 MAX_CANDIDATES: Final = 5
-
-
 KEPT_WITHIN: Final = 10.0
 
 
@@ -76,37 +68,6 @@ MOST: Final = 0.75
 
 #: Rates that differ by less than this factor are as good as the same.
 RATE_FACTOR: Final = 1.25
-
-
-class BelievedStructure(NamedTuple):
-    """A structure with the weight it has, and what it says of the K remembered objects.
-
-    Structures of one set are kinds beside each other: an object follows one of them or is plain. Sets exclude each
-    other.
-
-    Attributes:
-        structure: The structure.
-        weight: p(its set | all trials); with those of the other sets and of *no structure* it sums to one.
-        followers: Probability of each object to follow it, shape [K].
-        contents: What each object has in its registers, shape [K, P, S].
-        share: Probability of an object that was never met to follow it.
-        kinds: Number of its set.
-    """
-
-    structure: SharedStructure
-    weight: float
-    followers: FloatArray
-    contents: FloatArray
-    share: float
-    kinds: int
-
-
-def is_milestone(n_trials: int) -> bool:
-    """Return whether rates are estimated, and structures searched for, after this many trials."""
-    milestone = DENSE_MILESTONES
-    while milestone < n_trials:
-        milestone = -(-milestone * 5 // 4)
-    return n_trials <= DENSE_MILESTONES or milestone == n_trials
 
 
 class StructureLearner:

@@ -15,10 +15,12 @@ import numpy as np
 from atg_fg.core.errors import TooLargeError
 from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.learning import kernels
-from atg_fg.learning.chain import Chain, Structure, Task, Votes
+from atg_fg.learning.chain import Chain
 from atg_fg.learning.detector_noise import DetectorNoise
+from atg_fg.learning.milestones import is_milestone
 from atg_fg.learning.raw_trials import Recording
 from atg_fg.learning.register_search import search_registers
+from atg_fg.learning.sampling_task import Structure, Task, Votes
 from atg_fg.learning.saved_chain import SavedChain
 from atg_fg.learning.shared_structure import SharedStructure
 
@@ -47,14 +49,6 @@ class Conclusion(NamedTuple):
     weights: FloatArray
     objects: FloatArray
     log_predictive: float = 0.0
-
-
-def is_milestone(n_trials: int) -> bool:
-    """Return whether structures are searched for after this many trials: ever more rarely, by a quarter each time."""
-    milestone = 8
-    while milestone < n_trials:
-        milestone = -(-milestone * 5 // 4)
-    return n_trials <= 8 or milestone == n_trials
 
 
 class Population(ABC):

@@ -19,10 +19,9 @@ from atg_fg.core.patterns import (
     IntArray,
     PatternAlphabet,
     SlotLikelihoods,
-    check_confidences,
-    check_slots,
     read_only,
 )
+from atg_fg.core.slot_checks import check_confidences, check_slots
 
 
 @dataclass(frozen=True)
@@ -81,7 +80,12 @@ class RawTrial:
                 f"{place}: {len(self.likelihoods)} likelihoods; expected one for each of {len(self.detections)} looks"
             )
         for look, likelihoods in enumerate(self.likelihoods):
-            check_slots(likelihoods, assumptions.alphabet, f"{place}: look {look}: likelihoods")
+            check_slots(
+                likelihoods,
+                assumptions.alphabet.slots,
+                assumptions.alphabet.n_symbols,
+                f"{place}: look {look}: likelihoods",
+            )
         for action in self.actions:
             if not 0 <= action < len(assumptions.actions):
                 raise InvalidInputError(f"{place}: action {action}; expected 0 to {len(assumptions.actions) - 1}")

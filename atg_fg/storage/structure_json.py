@@ -11,7 +11,8 @@ from typing import Any, Final
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.checks import number, whole_number
 from atg_fg.core.errors import InvalidInputError, TooLargeError
-from atg_fg.core.patterns import Detection, SlotLikelihoods, check_confidences, check_slots
+from atg_fg.core.patterns import Detection, SlotLikelihoods
+from atg_fg.core.slot_checks import check_confidences, check_slots
 from atg_fg.learning.kinds import MAX_KINDS
 from atg_fg.learning.learner import MAX_CANDIDATES, StructureLearner
 from atg_fg.learning.rates import PRIORS, Rates
@@ -118,7 +119,7 @@ def _read_look(value: Any, assumptions: Assumptions, place: str) -> tuple[Detect
             for weight in entry:
                 number(weight, f"{place}, slot {slot!r}", 0.0)
     weights = [entry if isinstance(entry, list) else None for entry in entries]
-    return detection, check_slots(weights, assumptions.alphabet, place)
+    return detection, check_slots(weights, assumptions.alphabet.slots, assumptions.alphabet.n_symbols, place)
 
 
 #: Hidden registers that a file may name; far above what can be learned.

@@ -11,7 +11,7 @@ from atg_fg.core.records import TrialRecord, TrialSummary
 from atg_fg.core.table import Bar, Table, shortened
 from atg_fg.engines import begin_trial
 from atg_fg.experiments.trial import learn_from, run_trial
-from atg_fg.learning.learner import BelievedStructure
+from atg_fg.learning.believed_structure import BelievedStructure
 from atg_fg.learning.shared_structure import SharedStructure
 from atg_fg.learning.structured_memory import StructuredMemory
 from atg_fg.policies import make_policy

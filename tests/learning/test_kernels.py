@@ -7,11 +7,12 @@ import pytest
 
 from atg_fg.learning import chain as sampler
 from atg_fg.learning import gibbs_kernels, kernels, map_kernels, slip_kernels
-from atg_fg.learning.chain import Chain, Structure, Task
+from atg_fg.learning.chain import Chain
 from atg_fg.learning.detector_noise import DetectorNoise
 from atg_fg.learning.kernels import TrialArrays
 from atg_fg.learning.number_of_objects import log_new_weights, log_partition
 from atg_fg.learning.raw_trials import Recording
+from atg_fg.learning.sampling_task import Structure, Task
 
 #: Action 0 turns the ring; action 1 leaves the third register where it is, and swaps the others.
 RING = Structure(np.array([[1, 2, 0], [1, 0, 2]]), np.array([[0], [1], [2]]), 3)

@@ -5,7 +5,8 @@ import numpy as np
 import pytest
 
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.learning.learner import N_DRAWS, StructureLearner, is_milestone
+from atg_fg.learning.learner import N_DRAWS, StructureLearner
+from atg_fg.learning.milestones import is_milestone
 from atg_fg.learning.rates import Rates
 from atg_fg.storage.structure_json import read_learner, write_learner
 from atg_fg.worlds.families import hexagonal_prisms

@@ -1,0 +1,56 @@
+"""What a detector says of each slot, checked."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from atg_fg.core.checks import brief
+from atg_fg.core.errors import InvalidInputError
+
+
+def check_slots(
+    likelihoods: Sequence[ArrayLike | None], slots: Sequence[str], n_symbols: int, place: str = "likelihoods"
+) -> tuple[tuple[float, ...] | None, ...]:
+    """Return likelihoods of each slot's symbols as tuples, or raise ``InvalidInputError`` naming ``place``.
+
+    None at all are as good.
+    """
+    if len(likelihoods) not in (0, len(slots)):
+        raise InvalidInputError(f"{place}: {len(likelihoods)}; expected one for each of {len(slots)} slots, or none")
+    result: list[tuple[float, ...] | None] = []
+    for slot, given in zip(slots, likelihoods, strict=False):
+        if given is None:
+            result.append(None)
+            continue
+        where = f"{place}, slot {slot!r}"
+        try:
+            weights = np.array(given, dtype=np.float64)
+        except (TypeError, ValueError) as error:
+            raise InvalidInputError(f"{where}: {brief(given)}; expected numbers") from error
+        if weights.shape != (n_symbols,):
+            raise InvalidInputError(
+                f"{where}: shape {weights.shape}; expected a weight for each of {n_symbols} symbols"
+            )
+        if not (weights.min() >= 0 and 0 < weights.sum() < np.inf):  # a NaN is neither
+            raise InvalidInputError(
+                f"{where}: {brief(weights.tolist())}; expected finite ones of at least 0, not all 0"
+            )
+        result.append(tuple(weights.tolist()))
+    return tuple(result)
+
+
+def check_confidences(
+    confidences: Sequence[float | None], n_slots: int, place: str = "confidences"
+) -> tuple[float | None, ...]:
+    """Return confidences as a tuple, or raise ``InvalidInputError`` naming ``place``; none at all are as good."""
+    if len(confidences) not in (0, n_slots):
+        raise InvalidInputError(f"{place}: {len(confidences)}; expected one for each of {n_slots} slots, or none")
+    for value in confidences:
+        is_number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
+        if value is not None and not (is_number and math.isfinite(value)):
+            raise InvalidInputError(f"{place}: {brief(value)}; expected finite numbers or null")
+    return tuple(None if value is None else float(value) for value in confidences)
