@@ -37,6 +37,7 @@ app.command()(memory_files.diff)
 app.command()(memory_compact.compact)
 app.command()(memory_duplicates.duplicates)
 app.command()(memory_duplicates.unmerge)
+app.command()(memory_duplicates.rename)
 app.command()(structure.structure)
 
 

@@ -1,4 +1,4 @@
-"""``atg-fg memory duplicates`` and ``unmerge``: ATGs of one object are merged, and taken apart again."""
+"""``atg-fg memory duplicates``, ``unmerge`` and ``rename``: ATGs of one object are merged, taken apart, and named."""
 
 from __future__ import annotations
 
@@ -70,6 +70,20 @@ def unmerge(
     say(f"{file}: {name} is an ATG of its own again")
 
 
+def rename(
+    file: options.MemoryFile,
+    old: Annotated[str, typer.Argument(help="Name of an ATG.", show_default=False)],
+    new: Annotated[str, typer.Argument(help="The name that it is to have.", show_default=False)],
+) -> None:
+    """Give an object another name; all that was learned stays with it.
+
+    Example: atg-fg memory rename memory.json object-003 cup
+    """
+    with _changed(file) as memory:
+        memory.rename(old, new)
+    say(f"{file}: {old} is {new}")
+
+
 @contextmanager
 def _changed(file: Path) -> Iterator[RobotMemory]:
     """Give a memory, and write to its file what was changed, all of it or nothing."""
@@ -79,7 +93,7 @@ def _changed(file: Path) -> Iterator[RobotMemory]:
         return
     plain_files.check_writable(file)
     memory = memory_files.load_memory(file)
-    before = memory.merges
+    before = memory.merges, memory.names
     yield memory
-    if memory.merges != before:
+    if (memory.merges, memory.names) != before:
         memory_files.save_memory(memory, file)

@@ -104,3 +104,18 @@ def test_only_atgs_go_into_a_compact_memory(refused, tmp_path):
     memory_files.save_memory(memory, tmp_path / "memory.json")
     error = refused("memory", "compact", tmp_path / "memory.json", "--output", tmp_path / "memory.npz")
     assert "merges or a learned structure" in error
+
+
+@pytest.mark.parametrize("name", ["robot.json", "robot.db"])
+def test_an_object_gets_another_name_and_keeps_what_was_learned(run, refused, tmp_path, name):
+    path = tmp_path / name
+    run("trial", "--preset", "learned", "--actions", "3", "--save-memory", path, "--seed", "1")
+    before = memory_files.load_memory(path)
+    assert run("memory", "rename", path, "object-000", "cup")[0] == 0
+    after = memory_files.load_memory(path)
+    assert after.names == ("cup",)
+    assert after["cup"].counts == before["object-000"].counts
+    assert after.learner.owners == ["cup"]
+    assert "name 'cup' is taken" in refused("memory", "rename", path, "cup", "cup")
+    assert "object-000" in refused("memory", "rename", path, "object-000", "mug")
+    assert memory_files.load_memory(path) == after
