@@ -99,6 +99,9 @@ judged = recognise(later, memory, "learned-structure", learned)
 judged[0].record
 
 # %%
+atg.plot_belief(judged[0].record)
+
+# %%
 for each in judged:
     print(f"trial {each.trial.name}: {each.record.verdict}, {each.record.matched}; in truth {each.trial.object}")
 

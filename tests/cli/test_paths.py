@@ -40,6 +40,7 @@ OUTPUTS = {
     "memory show": {"json_file"},
     "memory structure": {"json_file", "plot"},
     "memory unmerge": set(),
+    "memory rename": set(),
     "print board": {"output"},
     "print cube": {"json_file", "output"},
     "replay": set(),

@@ -53,10 +53,23 @@ def go_on(inference: Inference, step: Any) -> None:
         inference.act(step)
 
 
+#: What subclasses fill: these change the engine, or want arguments.
+HOOKS = (
+    "update",
+    "predict",
+    "propagate",
+    "correct",
+    "solve",
+    "make_tables",
+    "learn_from_look",
+    "compute_smoothed_aspects",
+)
+
+
 def public_results(inference: Inference) -> Iterator[Any]:
     """Every public attribute, and what every public method returns; what is refused at this time is left out."""
     for name in dir(inference):
-        if name.startswith("_") or name in ("observe", "act"):
+        if name.startswith("_") or name in ("observe", "act", *HOOKS):
             continue
         try:
             value = getattr(inference, name)

@@ -44,7 +44,8 @@ def test_one_action_ahead_is_expected_entropy(inference):
         looks = tree.after(action)
         assert looks.probabilities.sum() == pytest.approx(1.0, abs=1e-12)
         expected = looks.probabilities @ looks.entropies
-        assert expected == pytest.approx(tree.expected_entropies()[action], abs=1e-6)
+        # Objects that hardly matter are left out of both, in two ways.
+        assert expected == pytest.approx(tree.expected_entropies()[action], abs=1e-4)
 
 
 def test_an_imagined_look_leaves_the_belief_that_the_real_one_does(memory):
