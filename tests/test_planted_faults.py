@@ -13,7 +13,7 @@ ROOT = Path(__file__).parents[1]
 #: The first two chunks of random models, every engine, the oracle beside them.
 TESTS = ["tests/engines/test_agreement.py", "-k", "posterior and (-0] or -1])"]
 #: The compiled filter beside the one in NumPy.
-TESTS_OF_KERNELS = ["tests/kernels/test_compiled_filter.py"]
+TESTS_OF_KERNELS = ["tests/inference/kernels/test_compiled_filter.py"]
 
 
 @dataclass(frozen=True)
@@ -113,19 +113,19 @@ FAULTS = [
     ),
     Fault(
         "compiled: an aspect found takes all of the collection node",
-        "kernels/belief_kernels.py",
+        "inference/kernels/belief_kernels.py",
         "revealed = aspects[hypothesis, 0] * (1.0 if target == constants.n_aspects else share)",
         "revealed = aspects[hypothesis, 0]",
     ),
     Fault(
         "compiled: a state shows its pattern without noise",
-        "kernels/belief_kernels.py",
+        "inference/kernels/belief_kernels.py",
         "aspects[hypothesis, state] * (observed * evidence[pattern] + noise)",
         "aspects[hypothesis, state] * (observed * evidence[pattern])",
     ),
     Fault(
         "compiled: a new edge out of its order",
-        "kernels/belief_kernels.py",
+        "inference/kernels/belief_kernels.py",
         "while place > first and not _precedes(tables, place - 1, action, target, source):",
         "while False:",
     ),
@@ -156,7 +156,9 @@ def check_is_caught(fault: Fault, copy: Path) -> None:
     text = file.read_text()
     assert text.count(fault.right) == 1, f"{fault.file} has changed; expected once: {fault.right}"
     file.write_text(text.replace(fault.right, fault.wrong))
-    assert not passes_its_tests(copy, of_kernels=fault.file.startswith("kernels/")), f"not caught: {fault.name}"
+    assert not passes_its_tests(copy, of_kernels=fault.file.startswith("inference/kernels/")), (
+        f"not caught: {fault.name}"
+    )
 
 
 def test_the_copy_without_a_fault_passes(copy):

@@ -16,7 +16,7 @@ from atg_fg.cli.lazy_commands import LazyCommand, LazyGroup
 from atg_fg.core.errors import AtgError, InvalidInputError
 from atg_fg.core.version import __version__
 from atg_fg.core.visible_text import visible
-from atg_fg.kernels.compilation import tell_of_compilation
+from atg_fg.inference.kernels.compilation import tell_of_compilation
 
 #: The commands, and groups of them, by the panel of the help page that they stand in; each with its place.
 COMMANDS: Final = {

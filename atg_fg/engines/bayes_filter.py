@@ -1,8 +1,9 @@
 """The paper's own method: a Bayes filter.
 
 A transition row is ``prior_weight · base_row`` plus a few counted edges (``atg_fg.inference.recognition_model``), so a
-step costs what the known edges cost. Where Numba is installed the loops over them are compiled (``atg_fg.kernels``),
-and the model's tables are only made if something asks for them; else NumPy computes the same.
+step costs what the known edges cost. Where Numba is installed the loops over them are compiled
+(``atg_fg.inference.kernels``), and the model's tables are only made if something asks for them; else NumPy computes the
+same.
 """
 
 from __future__ import annotations
@@ -15,11 +16,11 @@ from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.patterns import Evidence, FloatArray
 from atg_fg.engines.filtering import FilterInference, FilterState
 from atg_fg.engines.tables_on_demand import TablesOnDemand
+from atg_fg.inference.kernels import compilation
 from atg_fg.inference.recognition_model import RecognitionModel
-from atg_fg.kernels import compilation
 
 if TYPE_CHECKING:
-    from atg_fg.kernels.compiled_filter import CompiledFilter
+    from atg_fg.inference.kernels.compiled_filter import CompiledFilter
 
 
 class BayesFilter(FilterInference):
@@ -42,7 +43,7 @@ class BayesFilter(FilterInference):
         if not isinstance(self.model, TablesOnDemand):
             super()._begin()
             return
-        from atg_fg.kernels.compiled_filter import CompiledFilter  # it loads Numba
+        from atg_fg.inference.kernels.compiled_filter import CompiledFilter  # it loads Numba
 
         self._compiled = CompiledFilter(self.memory, self.parameters, self.model.prior)
 

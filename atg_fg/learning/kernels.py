@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.kernels.compilation import compiled
+from atg_fg.inference.kernels.compilation import compiled
 
 #: Products are put aside as a logarithm before they leave the range of floating-point numbers.
 _SMALL = 1e-120

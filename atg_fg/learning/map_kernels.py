@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.kernels.compilation import compiled
+from atg_fg.inference.kernels.compilation import compiled
 from atg_fg.learning.kernels import (
     TrialArrays,
     draw_by_logarithm,

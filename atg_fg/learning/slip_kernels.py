@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.kernels.compilation import compiled
+from atg_fg.inference.kernels.compilation import compiled
 from atg_fg.learning.gibbs_kernels import count_votes, log_total, put_in, take_out, trial_weights
 from atg_fg.learning.kernels import (
     Clusters,

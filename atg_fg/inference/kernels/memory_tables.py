@@ -11,7 +11,7 @@ import numpy as np
 from atg_fg.core.compact.columns import positions
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.kernels.belief_kernels import Tables, weigh
+from atg_fg.inference.kernels.belief_kernels import Tables, weigh
 
 #: Room that each row has for the aspects and edges that a trial finds, before rows have to be moved.
 ROOM: Final = 12

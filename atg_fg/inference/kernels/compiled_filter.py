@@ -11,8 +11,8 @@ from atg_fg.core.actions import AnyAction, UncertainAction, mixed
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import FloatArray
-from atg_fg.kernels import belief_kernels as kernels
-from atg_fg.kernels.memory_tables import ROOM, arrays_for_trial, with_more_room
+from atg_fg.inference.kernels import belief_kernels as kernels
+from atg_fg.inference.kernels.memory_tables import ROOM, arrays_for_trial, with_more_room
 
 #: Hypotheses whose terms are made at once: they stay in the processor's cache until their logarithms are taken.
 _BLOCK: Final = 1024

@@ -18,7 +18,7 @@ from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, PatternAlphabet
 from atg_fg.engines import begin_trial
 from atg_fg.inference.interface import Inference
-from atg_fg.kernels import compilation
+from atg_fg.inference.kernels import compilation
 from tests.models import cases
 
 ASSUMPTIONS = Assumptions(9, 5, ("turn", "tip"), PatternAlphabet(("front", "top"), 4))

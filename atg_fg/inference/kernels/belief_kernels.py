@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.kernels.compilation import compiled, reordered
+from atg_fg.inference.kernels.compilation import compiled, reordered
 
 #: Smallest normal number, in place of zero under a logarithm: x ln x of what is below it is zero up to rounding.
 _LEAST: Final = float(np.finfo(np.float64).tiny)

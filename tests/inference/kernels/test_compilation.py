@@ -9,7 +9,7 @@ from pathlib import Path
 
 TRIAL = """
 import sys
-from atg_fg.kernels import compilation
+from atg_fg.inference.kernels import compilation
 from atg_fg.core.assumptions import arcube_assumptions
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
