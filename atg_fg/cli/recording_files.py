@@ -38,22 +38,23 @@ def check(
     """
     options.check_json_option(json_file)
     recording, faults = check_recording(file, given_spec(spec, slots, actions, labels, objects, None, None))
-    document = {
-        "command": "recordings check",
-        "file": str(file),
+    names_of = {
         "slots": list(recording.slots),
         "actions": list(recording.actions),
         "labels": list(recording.labels),
+        "objects": sorted({trial.object for trial in recording.trials if trial.object is not None}),
+    }
+    document = {
+        "command": "recordings check",
+        "file": str(file),
+        **names_of,
         "trials": len(recording.trials),
         "looks": sum(len(trial.looks) for trial in recording.trials),
-        "objects": sorted({trial.object for trial in recording.trials if trial.object is not None}),
         "odd": [{"kind": each.kind, "place": each.place, "what": each.what, "fatal": each.fatal} for each in faults],
     }
     options.write_json(document, json_file)
     if json_file != "-":
-        objects_named = {trial.object for trial in recording.trials if trial.object is not None}
-        kinds = {"slots": recording.slots, "actions": recording.actions, "labels": recording.labels}
-        for kind, names in {**kinds, "objects": sorted(objects_named)}.items():
+        for kind, names in names_of.items():
             if names:
                 say(f"{kind}: {', '.join(names)}")
         say(f"{document['trials']} trials, {document['looks']} looks")

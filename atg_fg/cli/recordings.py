@@ -21,7 +21,7 @@ from atg_fg.core.table import Table
 from atg_fg.engines import engine_for
 from atg_fg.experiments import recorded_trials
 from atg_fg.experiments.scores import Score
-from atg_fg.learning.predictive_checks import summary_of_evidence
+from atg_fg.learning.predictive_checks import summary_of_evidence, too_many_graphs
 from atg_fg.learning.structured_memory import StructuredMemory, memory_for
 from atg_fg.storage import plain_files
 from atg_fg.storage.memory_files import goes_to_database, load_memory, open_memory, save_memory
@@ -52,7 +52,6 @@ Exclusive = Annotated[
 MemoryPath = Annotated[
     Path, typer.Option(help="The memory; a new one is begun if there is none.", writable=True, show_default=False)
 ]
-OldMemory = Annotated[Path, typer.Option(help="The memory.", show_default=False)]
 
 
 def learn(
@@ -155,7 +154,10 @@ def recognise(
             "command": "recognise",
             "trials": [recorded_trials.trial_document(each) for each in found],
             "score": scored,
-            "warnings": [*_warnings(kept, recordings), *recorded_trials.improbable_trials(found)],
+            "warnings": [
+                *_warnings(kept, _evidence_of(kept), recordings),
+                *recorded_trials.improbable_trials(found),
+            ],
         }
         if write_page is not None and report is not None:
             write_page(found, kept, scored, report)
@@ -209,8 +211,7 @@ def _memory_for(
             return memory_for(parameters, held)
         return memory_for(parameters, open_memory(path))
     first = recordings[0]
-    assumptions = first.assumptions(is_open=True)
-    assumptions = _extended(assumptions, recordings)
+    assumptions = _extended(first.assumptions(), recordings)
     if keeps and goes_to_database(path):
         return memory_for(parameters, open_memory(path, assumptions))
     return memory_for(parameters, RobotMemory(assumptions))
@@ -230,7 +231,7 @@ def _page_writer() -> Any:
 
 
 def _learned(memory: RobotMemory, path: Path, recordings: Sequence[Recording]) -> dict[str, Any]:
-    evidence = summary_of_evidence(memory) if isinstance(memory, StructuredMemory) else {}
+    evidence = _evidence_of(memory)
     trials = len(memory.learner.trials) if isinstance(memory, StructuredMemory) else None
     return {
         "memory": str(path),
@@ -238,20 +239,18 @@ def _learned(memory: RobotMemory, path: Path, recordings: Sequence[Recording]) -
         "trials": trials,
         "wrong": evidence.get("wrong"),
         "slip": evidence.get("slip"),
-        "warnings": _warnings(memory, recordings),
+        "warnings": _warnings(memory, evidence, recordings),
     }
 
 
-def _warnings(memory: RobotMemory, recordings: Sequence[Recording]) -> list[str]:
+def _evidence_of(memory: RobotMemory) -> dict[str, Any]:
+    return summary_of_evidence(memory) if isinstance(memory, StructuredMemory) else {}
+
+
+def _warnings(memory: RobotMemory, evidence: dict[str, Any], recordings: Sequence[Recording]) -> list[str]:
     """Return which assumptions do not seem to hold, by what was learned and what was recorded."""
-    n_objects = memory.assumptions.n_objects
-    warnings = list(summary_of_evidence(memory).get("warnings", [])) if isinstance(memory, StructuredMemory) else []
-    if not warnings and len(memory) > n_objects:
-        warnings = [
-            f"{len(memory)} ATGs, but n_objects is {n_objects}: there are more objects, or one has several ATGs"
-        ]
     return [
-        *warnings,
+        *(evidence.get("warnings") or too_many_graphs(memory)),
         *(
             f"{each.place}: {odd.what}"
             for each in recordings

@@ -11,6 +11,7 @@ import numpy as np
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.look_info import confidences_in, confidences_of, truth_of
 from atg_fg.core.patterns import Confidences, Detection, Evidence, FloatArray
 from atg_fg.core.table import Bar, Cell, Table, shortened
 
@@ -18,17 +19,6 @@ from atg_fg.core.table import Bar, Cell, Table, shortened
 Verdict: TypeAlias = Literal["novel", "known", "lost", "undecided"]
 
 VERDICTS: Final[tuple[Verdict, ...]] = get_args(Verdict)
-
-
-def confidences_in(info: Mapping[str, Any]) -> Confidences:
-    """Return how sure the detector is of each symbol, as a world's ``info`` of a look has it; empty without."""
-    return tuple(info.get("confidences") or ())
-
-
-def confidences_of(looks: Sequence[Mapping[str, Any]]) -> tuple[Confidences, ...]:
-    """Return the confidences in the ``info`` of each look; empty if there are none at all."""
-    stated = tuple(confidences_in(info) for info in looks)
-    return stated if any(stated) else ()
 
 
 class Mistake(NamedTuple):
@@ -134,9 +124,7 @@ class TrialRecord:
             evidence.check(len(assumptions.alphabet))
             action = None if time == len(actions) else assumptions.action_of(actions[time], f"trial, action {time}")
             seen = evidence.detection or (None,) * len(assumptions.alphabet.slots)
-            truth: dict[str, Any] = {} if name is None else {"object": name}
-            truth |= {"confidences": evidence.confidences} if evidence.confidences else {}
-            truth |= {"likelihoods": evidence.slots} if evidence.slots else {}
+            truth = truth_of(evidence, name)
             record.steps.append(TrialStep(seen, evidence.pattern, belief, 0.0, truth, action=action))
         return record
 

@@ -22,11 +22,16 @@ class Compared(Protocol):
     """What was measured of an engine: errors and seconds of each decision, shape [looks]; or why it was refused."""
 
     @property
-    def total_variation(self) -> FloatArray: ...  # noqa: D102
+    def total_variation(self) -> FloatArray:
+        """½ Σ |p(O) − q(O)| to the reference, shape [looks]."""
+
     @property
-    def seconds(self) -> FloatArray: ...  # noqa: D102
+    def seconds(self) -> FloatArray:
+        """Of each decision, shape [looks]."""
+
     @property
-    def refused(self) -> str | None: ...  # noqa: D102
+    def refused(self) -> str | None:
+        """Why the engine did not do the trials, ``None`` if it did."""
 
 
 def plot_comparison(records: Mapping[str, Compared], *, title: str = "Error against the time of a decision") -> Figure:

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from atg_fg.core.assumptions import Assumptions, arcube_assumptions
 from atg_fg.core.errors import InvalidInputError, TooLargeError
+from atg_fg.core.look_info import evidence_in
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, FloatArray, read_only
@@ -96,15 +97,7 @@ class Course(NamedTuple):
         if isinstance(trial, RecordedTrial):
             looks = [look.evidence(assumptions.alphabet) for look in trial.looks]
             return cls(looks, [assumptions.action_index(action) for action in trial.actions])
-        looks = []
-        for step in trial.steps:
-            soft = step.truth.get("likelihoods", ())
-            given = (step.detection, step.confidences)
-            looks.append(
-                Evidence.of_slots(assumptions.alphabet, soft, *given)
-                if soft
-                else Evidence.of_detection(assumptions.alphabet, *given)
-            )
+        looks = [evidence_in(assumptions.alphabet, step.detection, step.truth) for step in trial.steps]
         return cls(looks, trial.actions)
 
 

@@ -6,8 +6,8 @@ seen, as often as it likes, and what was done in the end, which may be something
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, NamedTuple
+from collections.abc import Mapping, Sequence
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -180,7 +180,7 @@ class RecognitionAgent:
         """Return numbers, with ``MISSING`` among them or of many worlds, as an array; any other look as it is."""
         if look is None or isinstance(look, (Evidence, Mapping, str)):
             return look
-        rows = list(look)  # type: ignore[arg-type]
+        rows: list[Any] = list(cast("Sequence[Any]", look))
         of_worlds = bool(rows) and all(isinstance(row, (list, tuple, np.ndarray)) for row in rows)
         return np.asarray(rows) if of_worlds or MISSING in rows else look
 

@@ -8,14 +8,16 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.look_info import truth_of
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.patterns import Evidence
 from atg_fg.core.recordings import RecordedTrial, Recording
 from atg_fg.core.records import TrialRecord, TrialStep, TrialSummary
 from atg_fg.core.statistics import wilson_interval
 from atg_fg.engines import begin_trial
 from atg_fg.experiments.scores import Score
-from atg_fg.experiments.trial import can_be_learned, learn_from, learn_steps
+from atg_fg.experiments.trial import can_be_learned, follow, learn_from, learn_steps
 from atg_fg.learning.predictive_checks import WORSE_THAN_CHANCE
 
 
@@ -64,10 +66,8 @@ def recognise(
         record = _recognised(trial, memory, engine, parameters, recording.place)
         found.append(Recognised(trial, record, learn_from(record, memory) if learn else None))
         if scores is not None:
-            before = scores.successes
-            scores.add(TrialSummary.of(record), found[-1].learned)
+            found[-1] = found[-1]._replace(right=scores.add(TrialSummary.of(record), found[-1].learned))
             scores.mend(memory)
-            found[-1] = found[-1]._replace(right=scores.successes > before)
         if on_trial is not None:
             on_trial()
     return found
@@ -97,7 +97,7 @@ def teach(recording: Recording, memory: RobotMemory, on_trial: Callable[[], None
     return taught
 
 
-def _evidence(trial: RecordedTrial, memory: RobotMemory, place: str) -> list[Any]:
+def _evidence(trial: RecordedTrial, memory: RobotMemory, place: str) -> list[Evidence]:
     looks = []
     for step, look in enumerate(trial.looks):
         try:
@@ -114,23 +114,9 @@ def _actions(trial: RecordedTrial, memory: RobotMemory) -> list[int]:
 def _recognised(
     trial: RecordedTrial, memory: RobotMemory, engine: str, parameters: ModelParameters, place: str
 ) -> TrialRecord:
-    inference = begin_trial(engine, memory, parameters)
-    record = TrialRecord(memory.names, memory.assumptions)
-    actions = [*_actions(trial, memory), None]
-    for evidence, action in zip(_evidence(trial, memory, place), actions, strict=True):
-        inference.observe(evidence)
-        belief = inference.conclude() if action is None else inference.identity()
-        truth: dict[str, Any] = {} if trial.object is None else {"object": trial.object}
-        if evidence.confidences:
-            truth["confidences"] = evidence.confidences
-        if evidence.slots:
-            truth["likelihoods"] = evidence.slots
-        seen = evidence.detection or (None,) * len(memory.assumptions.alphabet.slots)
-        record.steps.append(TrialStep(seen, evidence.pattern, belief, inference.log_evidence, truth, action=action))
-        if action is not None:
-            inference.act(action)
-    record.mistakes = inference.mistakes()
-    return record
+    looks = _evidence(trial, memory, place)
+    truths = [truth_of(look, trial.object) for look in looks]
+    return follow(begin_trial(engine, memory, parameters), looks, _actions(trial, memory), truths)
 
 
 def scored_afterwards(found: Sequence[Recognised], made_from: dict[str, object]) -> tuple[Score, list[Recognised]]:
@@ -140,12 +126,8 @@ def scored_afterwards(found: Sequence[Recognised], made_from: dict[str, object])
         found: The trials.
         made_from: The object that each ATG was made from.
     """
-    scores, judged = Score(made_from, learns=False), []
-    for each in found:
-        before = scores.successes
-        scores.add(TrialSummary.of(each.record), None)
-        judged.append(each._replace(right=scores.successes > before))
-    return scores, judged
+    scores = Score(made_from, learns=False)
+    return scores, [each._replace(right=scores.add(TrialSummary.of(each.record), None)) for each in found]
 
 
 def score_document(scores: Score) -> dict[str, Any]:

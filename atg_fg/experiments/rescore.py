@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.look_info import evidence_in
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
-from atg_fg.core.patterns import Evidence
-from atg_fg.core.records import TrialRecord, TrialStep, TrialSummary, confidences_in
+from atg_fg.core.records import TrialRecord, TrialSummary
 from atg_fg.engines import begin_trial
 from atg_fg.experiments.scores import Score, TestResult
-from atg_fg.experiments.trial import learn_from
+from atg_fg.experiments.trial import follow, learn_from
 from atg_fg.learning.structured_memory import memory_for
 from atg_fg.storage.recorded_test import RecordedTest
 
@@ -44,16 +44,9 @@ def _judged(
     trial: TrialSummary, memory: RobotMemory, assumptions: Assumptions, engine: str, parameters: ModelParameters
 ) -> TrialRecord:
     """Return a recorded trial with the beliefs of this model."""
+    looks = [evidence_in(assumptions.alphabet, step.observed, step.truth) for step in trial.steps]
+    actions = [assumptions.action_index(action) for action in trial.actions]
     inference = begin_trial(engine, memory, parameters)
-    record = TrialRecord(memory.names, assumptions, lost_truth=trial.lost_truth)
-    for look in trial.steps:
-        evidence = Evidence.of_detection(assumptions.alphabet, look.observed, confidences_in(look.truth))
-        inference.observe(evidence)
-        action = None if look.action is None else assumptions.action_index(look.action)
-        belief = inference.conclude() if action is None else inference.identity()
-        evidenced = inference.log_evidence
-        record.steps.append(TrialStep(look.observed, evidence.pattern, belief, evidenced, look.truth, None, action))
-        if action is not None:
-            inference.act(action)
-    record.mistakes = inference.mistakes()
+    record = follow(inference, looks, actions, [step.truth for step in trial.steps])
+    record.lost_truth = trial.lost_truth
     return record

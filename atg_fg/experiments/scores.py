@@ -68,8 +68,8 @@ class Score:
         self._made_from: dict[str, object] = dict(made_from or {})
         self._presented: set[object] = set(self._made_from.values())
 
-    def add(self, trial: TrialSummary, learned: str | None) -> None:
-        """Score a trial whose record went to the ATG named ``learned``.
+    def add(self, trial: TrialSummary, learned: str | None) -> bool:
+        """Score a trial whose record went to the ATG named ``learned``; return whether it was a success.
 
         A trial without a verdict is no success, but its object was met.
         """
@@ -83,13 +83,15 @@ class Score:
         self.identified += identified
         self.judged_known += seen_before and identified
         self.recognised += seen_before and identified and right_match
-        self.successes += identified and (right_match or not seen_before)
+        success = identified and (right_match or not seen_before)
+        self.successes += success
         if self._learns:
             self._presented.add(trial.object)
         if learned is not None:
             self._learned_from.append((trial.object, seen_before))
             if trial.verdict == "novel":
                 self._made_from[learned] = trial.object
+        return success
 
     def mend(self, memory: RobotMemory) -> None:
         """Take note of raw trials that the memory has given to other ATGs than they had been.

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.look_info import confidences_in
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.patterns import Evidence
-from atg_fg.core.records import TrialRecord, TrialStep, TrialSummary, confidences_in
+from atg_fg.core.records import TrialRecord, TrialStep, TrialSummary
 from atg_fg.core.sense import Sense, SenseTrial, likelihoods_of, readings_of
 from atg_fg.inference.interface import Inference
 from atg_fg.policies import Policy
@@ -128,6 +129,31 @@ def run_trial(
             record.lost_truth = truth
             return record
         remaining = 0 if terminated or truncated else remaining - 1
+
+
+def follow(
+    inference: Inference, looks: Sequence[Evidence], actions: Sequence[int], truths: Sequence[dict[str, Any]]
+) -> TrialRecord:
+    """Let an engine go through looks and actions that are given, and return the record with its beliefs.
+
+    Args:
+        inference: An engine at the beginning of a trial.
+        looks: Evidence of each look, at least one.
+        actions: Index of what was done after each; none after the last one, but for an object that was lost then.
+        truths: The ``info`` of each look.
+    """
+    assumptions = inference.memory.assumptions
+    record = TrialRecord(inference.memory.names, assumptions)
+    for time, (evidence, truth) in enumerate(zip(looks, truths, strict=True)):
+        inference.observe(evidence)
+        action = actions[time] if time < len(actions) else None
+        belief = inference.conclude() if action is None else inference.identity()
+        seen = evidence.detection or (None,) * len(assumptions.alphabet.slots)
+        record.steps.append(TrialStep(seen, evidence.pattern, belief, inference.log_evidence, truth, action=action))
+        if action is not None:
+            inference.act(action)
+    record.mistakes = inference.mistakes()
+    return record
 
 
 def can_be_learned(trial: TrialSummary) -> bool:

@@ -6,6 +6,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from atg_fg.core.memory import RobotMemory
 from atg_fg.learning.structured_memory import StructuredMemory
 
 #: Nats by which labels drawn at random have to explain a trial better than the model does, for a warning.
@@ -40,15 +41,16 @@ def predictive_checks(memory: StructuredMemory) -> list[str]:
 
     More ATGs than objects; trials that the model, each taken for one of a fresh object, explains worse than chance.
     """
-    warnings = []
-    n_objects = memory.assumptions.n_objects
-    if len(memory) > n_objects:
-        warnings.append(
-            f"{len(memory)} ATGs, but n_objects is {n_objects}: there are more objects, or one has several ATGs"
-        )
-    warnings += [
+    return too_many_graphs(memory) + [
         f"trial {number} is less probable than labels drawn at random: its object is moved otherwise than all others "
         "(actions), or the detector erred more than usual (noise)"
         for number in np.flatnonzero(memory.evidence.log_gain_over_chance() < -WORSE_THAN_CHANCE).tolist()
     ]
-    return warnings
+
+
+def too_many_graphs(memory: RobotMemory) -> list[str]:
+    """Return a warning if there are more ATGs than objects."""
+    n_objects = memory.assumptions.n_objects
+    if len(memory) <= n_objects:
+        return []
+    return [f"{len(memory)} ATGs, but n_objects is {n_objects}: there are more objects, or one has several ATGs"]

@@ -5,38 +5,18 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 from atg_fg.core.memory import RobotMemory
-from atg_fg.core.recordings import RecordedTrial
-from atg_fg.core.records import TrialRecord, TrialSummary
+from atg_fg.core.records import TrialSummary
+from atg_fg.experiments.recorded_trials import Recognised
 from atg_fg.report.content import Report, TrialPage
 from atg_fg.report.page import write_report
 from atg_fg.report.summaries import look_of, told_mistakes, told_truth, told_verdict, with_graphs
 from atg_fg.report.trial_record import best_objects
 
 
-class _Recognised(Protocol):
-    """What came of one trial."""
-
-    @property
-    def trial(self) -> RecordedTrial:
-        """Of the recording."""
-
-    @property
-    def record(self) -> TrialRecord:
-        """Look by look."""
-
-    @property
-    def right(self) -> bool | None:
-        """Whether the verdict is right."""
-
-    @property
-    def learned(self) -> str | None:
-        """Name of the ATG that it went to."""
-
-
-def write_page(found: Sequence[_Recognised], memory: RobotMemory, score: Mapping[str, Any] | None, path: Path) -> None:
+def write_page(found: Sequence[Recognised], memory: RobotMemory, score: Mapping[str, Any] | None, path: Path) -> None:
     """Write the page of trials that were recognised.
 
     Args:
@@ -55,7 +35,7 @@ def write_page(found: Sequence[_Recognised], memory: RobotMemory, score: Mapping
     write_report(Report(f"{len(pages)} trials of a recording{right}", {}, (note,), memory.assumptions, pages), path)
 
 
-def _page(each: _Recognised, memory: RobotMemory) -> TrialPage:
+def _page(each: Recognised, memory: RobotMemory) -> TrialPage:
     trial = TrialSummary.of(each.record)
     n_unseen = max(memory.assumptions.n_objects - len(each.record.names), 1)
     looks = [

@@ -114,9 +114,7 @@ class Retelling:
         notes = told_mistakes(trial, self._assumptions)
         page = TrialPage(title, told_verdict(trial.verdict, trial.matched), truth, None, (), (), notes=notes)
         page = with_graphs(page, looks, self._memory if self.inferred else None, self._assumptions, trial.matched)
-        before = self.score.successes
-        self.score.add(trial, learn_from(trial, self._memory))
-        return replace(page, right=self.score.successes > before)
+        return replace(page, right=self.score.add(trial, learn_from(trial, self._memory)))
 
     def _with_beliefs(self, looks: list[Look], parameters: ModelParameters, *, by_entropy: bool) -> list[Look]:
         """Return the looks with the belief over objects, if the memory leads to what was recorded."""

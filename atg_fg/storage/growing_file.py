@@ -7,8 +7,10 @@ taken for lost may still be at it.
 
 from __future__ import annotations
 
+import contextlib
 import gzip
 import json
+import os
 import zlib
 from collections.abc import Iterator, Mapping
 from pathlib import Path
@@ -17,7 +19,7 @@ from typing import Any
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.storage.checked_json import parse_json, plain_json
 from atg_fg.storage.limits import gzip_members
-from atg_fg.storage.plain_files import append_bytes, check_writable, read_bytes_file, write_bytes_atomically
+from atg_fg.storage.plain_files import check_writable, read_bytes_file, write_all, write_bytes_atomically
 
 
 class GrowingFile:
@@ -78,6 +80,30 @@ class GrowingFile:
         separators = (",", ":") if self._packed else None
         text = json.dumps(line, default=plain_json, allow_nan=False, separators=separators) + "\n"
         return gzip.compress(text.encode(), mtime=0) if self._packed else text.encode()
+
+
+def append_bytes(path: Path | str, content: bytes, start: int | None = None) -> int:
+    """Put bytes at the end of a file, or at ``start``, so that they are on the disk; return where they end.
+
+    Raises:
+        InvalidInputError: They cannot be written; the file is as long as it was.
+    """
+    try:
+        with open(path, "r+b", buffering=0) as file:
+            size = file.seek(0, os.SEEK_END)
+            begin = size if start is None else file.seek(start)
+            try:
+                write_all(file.fileno(), content)
+                os.fsync(file.fileno())
+            except OSError:
+                with contextlib.suppress(OSError):
+                    file.truncate(size)
+                raise
+    except OSError as error:
+        raise InvalidInputError(
+            f"{path}: cannot be written: {error.strerror}; what it held is kept, so that the work can be gone on with"
+        ) from error
+    return begin + len(content)
 
 
 def check_not_begun(path: Path) -> None:

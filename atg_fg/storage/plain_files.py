@@ -78,14 +78,20 @@ def read_bytes_file(path: Path | str) -> bytes:
     return content
 
 
-def read_text_file(path: Path | str) -> str:
+def read_text_file(path: Path | str, *, packed: bool = False) -> str:
     """Return the text of a UTF-8 file.
+
+    Args:
+        path: The file.
+        packed: Whether it may be gzipped.
 
     Raises:
         InvalidInputError: It cannot be read, or is not UTF-8.
-        TooLargeError: As for ``read_bytes_file``.
+        TooLargeError: As for ``read_bytes_file``, or it unfolds to more than ``limits.unpacked_limit``.
     """
     content = read_bytes_file(path)
+    if packed and content.startswith(GZIP):
+        content = _unpacked(content, path, "expected a gzipped text file")
     try:
         return content.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
     except UnicodeError as error:
@@ -115,12 +121,19 @@ def read_gzipped_text(path: Path | str, expected: str) -> str:
         InvalidInputError: It cannot be read, or is no such file.
         TooLargeError: It unfolds to more than ``limits.unpacked_limit``.
     """
-    content = read_bytes_file(path)
+    try:
+        return _unpacked(read_bytes_file(path), path, expected).decode()
+    except UnicodeError as error:
+        raise InvalidInputError(f"{path}: cannot be read: {error}; {expected}") from error
+
+
+def _unpacked(content: bytes, path: Path | str, expected: str) -> bytes:
+    """Return what gzipped content unfolds to; raise ``InvalidInputError`` if it is cut off or none."""
     try:
         parts = list(gzip_members(content, path))
         if not parts or parts[-1][1] < len(content):
             raise ValueError("cut off")
-        return b"".join(part for part, _ in parts).decode()
+        return b"".join(part for part, _ in parts)
     except (zlib.error, ValueError) as error:
         if isinstance(error, TooLargeError):
             raise
@@ -181,30 +194,6 @@ def write_bytes_atomically(path: Path | str, content: bytes) -> None:
         if isinstance(error, InvalidInputError):
             raise
         raise _cannot_write(path, error) from error
-
-
-def append_bytes(path: Path | str, content: bytes, start: int | None = None) -> int:
-    """Put bytes at the end of a file, or at ``start``, so that they are on the disk; return where they end.
-
-    Raises:
-        InvalidInputError: They cannot be written; the file is as long as it was.
-    """
-    try:
-        with open(path, "r+b", buffering=0) as file:
-            size = file.seek(0, os.SEEK_END)
-            begin = size if start is None else file.seek(start)
-            try:
-                _write_all(file.fileno(), content)
-                os.fsync(file.fileno())
-            except OSError:
-                with contextlib.suppress(OSError):
-                    file.truncate(size)
-                raise
-    except OSError as error:
-        raise InvalidInputError(
-            f"{path}: cannot be written: {error.strerror}; what it held is kept, so that the work can be gone on with"
-        ) from error
-    return begin + len(content)
 
 
 def check_writable(path: Path | str) -> None:
@@ -311,10 +300,11 @@ def _write_to_descriptor(descriptor: int, content: bytes) -> None:
     for stream in (sys.stdout, sys.stderr):
         if stream is not None:
             stream.flush()
-    _write_all(descriptor, content)
+    write_all(descriptor, content)
 
 
-def _write_all(descriptor: int, content: bytes) -> None:
+def write_all(descriptor: int, content: bytes) -> None:
+    """Write all of some bytes to an open descriptor."""
     left = memoryview(content)
     while left:
         left = left[os.write(descriptor, left) :]

@@ -16,8 +16,7 @@ from atg_fg.core.checks import brief, number, plain_text, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.recordings import RecordedLook, RecordedTrial, Recording, used_labels
 from atg_fg.storage.checked_json import check_format, parse_json, read_list, read_object, without_none
-from atg_fg.storage.limits import gzip_members
-from atg_fg.storage.plain_files import GZIP, read_bytes_file, read_text_file, write_bytes_atomically
+from atg_fg.storage.plain_files import read_text_file, write_bytes_atomically
 from atg_fg.storage.recording_csv import CsvReader, Fault, write_csv
 
 RECORDING_FORMAT: Final = "atg-fg/recording"
@@ -142,7 +141,7 @@ def write_recording(recording: Recording, path: Path | str) -> None:
 
 
 def _read(path: Path | str, spec: RecordingSpec) -> tuple[Recording, list[Fault]]:
-    text = _text(path)
+    text = read_text_file(path, packed=True)
     if text.lstrip("\ufeff \n").startswith("{"):
         return _of_lines(text, str(path), spec), []
     try:
@@ -152,16 +151,6 @@ def _read(path: Path | str, spec: RecordingSpec) -> tuple[Recording, list[Fault]
         raise InvalidInputError(f"{path}: {error}") from error
     columns = [name for weights in reader.columns.weights for _, name in weights]
     return _made(trials, spec._replace(slots=reader.columns.slots), columns, str(path)), reader.faults
-
-
-def _text(path: Path | str) -> str:
-    content = read_bytes_file(path)
-    if content.startswith(GZIP):
-        content = b"".join(part for part, _ in gzip_members(content, path))
-    try:
-        return content.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
-    except UnicodeError as error:
-        raise InvalidInputError(f"{path}: not UTF-8: {error}; expected a recording, CSV or JSON lines") from error
 
 
 def _made(trials: Sequence[RecordedTrial], spec: RecordingSpec, labels: Sequence[str], place: str) -> Recording:

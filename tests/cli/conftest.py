@@ -9,6 +9,9 @@ from atg_fg import cli
 def run(monkeypatch, capsys):
     """Run the command line in this process; return its exit status, standard output and standard error."""
 
+    # Whether loops are compiled now or were before is no business of these tests.
+    monkeypatch.setattr(cli, "tell_of_compilation", lambda tell: None)
+
     def called(*arguments):
         monkeypatch.setattr(sys, "argv", ["atg-fg", *map(str, arguments)])
         with pytest.raises(SystemExit) as left:

@@ -10,7 +10,8 @@ from contextlib import suppress
 import pytest
 
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.storage.plain_files import append_bytes, check_writable, write_bytes_atomically
+from atg_fg.storage.growing_file import append_bytes
+from atg_fg.storage.plain_files import check_writable, write_bytes_atomically
 
 WRITE = (
     "import sys; from atg_fg.storage.plain_files import *; "

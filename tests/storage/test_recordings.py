@@ -294,3 +294,9 @@ def test_a_million_rows_are_read_in_bounded_memory(written):
     n_trials, n_looks, mebibytes = map(int, done.stdout.split())
     assert (n_trials, n_looks) == (100_000, 1_000_000)
     assert mebibytes < 600  # about 210 where it was written
+
+
+@pytest.mark.parametrize("change", [lambda data: data[:-9], lambda data: data[:20] + b"xx" + data[22:]])
+def test_a_gzipped_table_that_is_damaged_is_refused(written, change):
+    with pytest.raises(InvalidInputError, match=r"looks\.csv: cannot be read: .*; expected a gzipped text file"):
+        read_recording(written(change(gzip.compress(PLAIN.encode()))))

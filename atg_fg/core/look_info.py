@@ -1,0 +1,36 @@
+"""What stands beside a look: the ``info`` of a world, or what is kept of evidence that came without one."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from atg_fg.core.patterns import Confidences, Detection, Evidence, PatternAlphabet
+
+
+def confidences_in(info: Mapping[str, Any]) -> Confidences:
+    """Return how sure the detector is of each symbol, as a world's ``info`` of a look has it; empty without."""
+    return tuple(info.get("confidences") or ())
+
+
+def confidences_of(looks: Sequence[Mapping[str, Any]]) -> tuple[Confidences, ...]:
+    """Return the confidences in the ``info`` of each look; empty if there are none at all."""
+    stated = tuple(confidences_in(info) for info in looks)
+    return stated if any(stated) else ()
+
+
+def truth_of(evidence: Evidence, presented: int | str | None = None) -> dict[str, Any]:
+    """Return the ``info`` of a look that came without a world: what was presented, if known, and the evidence kept."""
+    return {
+        **({} if presented is None else {"object": presented}),
+        **({"confidences": evidence.confidences} if evidence.confidences else {}),
+        **({"likelihoods": evidence.slots} if evidence.slots else {}),
+    }
+
+
+def evidence_in(alphabet: PatternAlphabet, detection: Detection, info: Mapping[str, Any]) -> Evidence:
+    """Return the evidence of a look that was recorded as a detection and the ``info`` beside it."""
+    likelihoods = info.get("likelihoods") or ()
+    if not any(likelihoods):
+        return Evidence.of_detection(alphabet, detection, confidences_in(info))
+    return Evidence.of_slots(alphabet, likelihoods, detection, confidences_in(info))
