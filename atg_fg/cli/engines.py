@@ -108,8 +108,7 @@ def _number_of_trials(trials: str) -> int:
 def _memory_and_recording(memory: Path, trials: str) -> tuple[RobotMemory, Recording]:
     """Return a memory that knows all labels of a recording, and the recording."""
     held, recording = load_memory(memory), read_recording(trials)
-    assumptions = assumptions_for(recording, held.assumptions)
-    return (held if assumptions == held.assumptions else extended_memory(held, assumptions)), recording
+    return extended_memory(held, assumptions_for(recording, held.assumptions)), recording
 
 
 @app.command()

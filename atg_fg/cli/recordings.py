@@ -201,12 +201,10 @@ def _memory_for(
     if keeps:
         plain_files.check_writable(path)
     if path.exists() and not (plain_files.is_plain_file(path) and path.stat().st_size == 0):
-        held = load_memory(path)
-        assumptions = _extended(held.assumptions, recordings)
-        if assumptions != held.assumptions:
-            held = extended_memory(held, assumptions)
-            if keeps:
-                save_memory(held, path)
+        there = load_memory(path)
+        held = extended_memory(there, _extended(there.assumptions, recordings))
+        if keeps and held is not there:
+            save_memory(held, path)
         if not keeps or not goes_to_database(path):
             return memory_for(parameters, held)
         return memory_for(parameters, open_memory(path))

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 pytest.importorskip("rosbags", reason="rosbags is not installed: pip install atg-fg[ros]")
+from rosbags.rosbag1 import Writer as OldWriter
 from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
@@ -101,6 +102,19 @@ def test_an_mcap_file_may_lie_by_itself(bag, topics, text, tmp_path):
     next(folder.glob("*.mcap")).rename(alone)
     (trial,) = read_bag(alone, topics(slots={"label": LABEL}, action=DID)).trials
     assert described(trial) == ("alone", [("logo",), ("lid",)], ("turn",), None)
+
+
+def test_a_bag_of_ros_1_is_read_too(topics, tmp_path):
+    store = get_typestore(Stores.ROS1_NOETIC)
+    with OldWriter(tmp_path / "old.bag") as writer:
+        connections = {
+            topic: writer.add_connection(topic, "std_msgs/msg/String", typestore=store) for topic in ("/seen", "/did")
+        }
+        for second, (topic, words) in enumerate([("/seen", "logo"), ("/did", "turn"), ("/seen", "lid")], 1):
+            message = store.types["std_msgs/msg/String"](words)
+            writer.write(connections[topic], second * SECOND, store.serialize_ros1(message, "std_msgs/msg/String"))
+    (trial,) = read_bag(tmp_path / "old.bag", topics(slots={"label": LABEL}, action=DID)).trials
+    assert described(trial) == ("old", [("logo",), ("lid",)], ("turn",), None)
 
 
 def test_of_many_detections_the_surest_counts(bag, topics, text, store):
