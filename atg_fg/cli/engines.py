@@ -21,7 +21,6 @@ from atg_fg.engines.options import name_and_options, named_engines
 from atg_fg.experiments import calibration, engine_comparison
 from atg_fg.experiments.document_tables import tables_of
 from atg_fg.storage.memory_files import load_memory
-from atg_fg.storage.memory_json import extended_memory
 from atg_fg.storage.presets import preset as preset_named
 from atg_fg.storage.recordings import read_recording
 
@@ -108,7 +107,7 @@ def _number_of_trials(trials: str) -> int:
 def _memory_and_recording(memory: Path, trials: str) -> tuple[RobotMemory, Recording]:
     """Return a memory that knows all labels of a recording, and the recording."""
     held, recording = load_memory(memory), read_recording(trials)
-    return extended_memory(held, assumptions_for(recording, held.assumptions)), recording
+    return held.extended(assumptions_for(recording, held.assumptions).alphabet.names), recording
 
 
 @app.command()

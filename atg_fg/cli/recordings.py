@@ -25,7 +25,6 @@ from atg_fg.learning.predictive_checks import summary_of_evidence, too_many_grap
 from atg_fg.learning.structured_memory import StructuredMemory, memory_for
 from atg_fg.storage import plain_files
 from atg_fg.storage.memory_files import goes_to_database, load_memory, open_memory, save_memory
-from atg_fg.storage.memory_json import extended_memory
 from atg_fg.storage.presets import preset as preset_named
 from atg_fg.storage.recordings import (
     RecordingSpec,
@@ -200,19 +199,15 @@ def _memory_for(
     """
     if keeps:
         plain_files.check_writable(path)
-    if path.exists() and not (plain_files.is_plain_file(path) and path.stat().st_size == 0):
-        there = load_memory(path)
-        held = extended_memory(there, _extended(there.assumptions, recordings))
-        if keeps and held is not there:
-            save_memory(held, path)
-        if not keeps or not goes_to_database(path):
-            return memory_for(parameters, held)
-        return memory_for(parameters, open_memory(path))
-    first = recordings[0]
-    assumptions = _extended(first.assumptions(), recordings)
+    is_there = path.exists() and not (plain_files.is_plain_file(path) and path.stat().st_size == 0)
     if keeps and goes_to_database(path):
-        return memory_for(parameters, open_memory(path, assumptions))
-    return memory_for(parameters, RobotMemory(assumptions))
+        held = open_memory(path) if is_there else open_memory(path, _extended(recordings[0].assumptions(), recordings))
+    elif is_there:
+        held = load_memory(path)
+    else:
+        held = RobotMemory(_extended(recordings[0].assumptions(), recordings))
+    held.extend(_extended(held.assumptions, recordings).alphabet.names)
+    return memory_for(parameters, held)
 
 
 def _extended(assumptions: Assumptions, recordings: Sequence[Recording]) -> Assumptions:

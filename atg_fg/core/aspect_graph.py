@@ -11,6 +11,7 @@ import numpy as np
 from atg_fg.core.assumptions import MAX_NUMBER, Assumptions
 from atg_fg.core.checks import whole_number
 from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.open_alphabets import Relabelling
 from atg_fg.core.patterns import IntArray, Pattern
 from atg_fg.core.table import Cell, Table, shortened
 
@@ -148,6 +149,13 @@ class AspectTransitionGraph:
         for source, action, target in zip(aspects, actions, aspects[1:], strict=False):
             if source is not None and action is not None and target is not None:
                 self.add_transition(source, action, target)
+
+    def relabelled(self, assumptions: Assumptions, labels: Relabelling) -> AspectTransitionGraph:
+        """Return the same graph under assumptions with another alphabet."""
+        graph = AspectTransitionGraph(self.name, assumptions)
+        graph._aspect_of = {int(labels.indices[pattern]): aspect for pattern, aspect in self._aspect_of.items()}
+        graph._counts = dict(self._counts)
+        return graph
 
     def absorb(self, other: AspectTransitionGraph) -> None:
         """Add the aspects and counts of another graph; a full graph takes no further aspects, nor what leads to them.

@@ -41,6 +41,16 @@ class Assumptions:
                 "since the aspects of one object are unique"
             )
 
+    def extends(self, other: Assumptions) -> bool:
+        """Return whether these are the other ones, perhaps with labels more that its open alphabet did not know."""
+        ours, theirs = (
+            (each.n_objects, each.n_aspects, each.actions, each.alphabet.slots, each.alphabet.exclusive)
+            for each in (self, other)
+        )
+        both_are_open = self.alphabet.is_open and other.alphabet.is_open
+        known = other.alphabet.names
+        return self == other or (both_are_open and ours == theirs and self.alphabet.names[: len(known)] == known)
+
     def action_of(self, action: int | str, place: str = "action") -> int:
         """Return the index of an action given by index or name, or raise ``InvalidInputError`` naming ``place``."""
         if isinstance(action, str):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 from typing import Final
 
 from atg_fg.core.aspect_graph import AspectTransitionGraph
@@ -10,6 +11,7 @@ from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.checks import plain_text
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.merging import Merge, check_merges
+from atg_fg.core.open_alphabets import Relabelling
 from atg_fg.core.patterns import Confidences, Detection, Evidence, SlotLikelihoods
 from atg_fg.core.sense import Readings, Sense, SensedTrial
 from atg_fg.core.table import Bar, Cell, Table
@@ -277,8 +279,38 @@ class RobotMemory(Persistent):
     def _unmerge_shared(self, merge: Merge) -> None:
         """Let what all objects share know that a merge was undone."""
 
+    def extended(self, labels: Iterable[str]) -> RobotMemory:
+        """Return a memory of the same whose open alphabet has these labels, too; itself if it has them all.
+
+        Raises:
+            InvalidInputError: The alphabet is closed, and lacks one.
+        """
+        before = self.assumptions.alphabet
+        alphabet = before.extended(labels)
+        if alphabet is before:
+            return self
+        return self._under(replace(self.assumptions, alphabet=alphabet), Relabelling(before, alphabet))
+
+    @one_transaction
+    def extend(self, labels: Iterable[str]) -> None:
+        """Add those of some labels that the open alphabet lacks; all that was learned stays.
+
+        Raises:
+            InvalidInputError: The alphabet is closed, and lacks one.
+        """
+        extended = self.extended(labels)
+        if extended is not self:
+            self.become(extended)
+
+    def _under(self, assumptions: Assumptions, labels: Relabelling) -> RobotMemory:
+        """Return a memory of the same under assumptions with another alphabet."""
+        graphs = (graph.relabelled(assumptions, labels) for graph in self)
+        merges = [merge.relabelled(assumptions, labels) for merge in self._merges]
+        return RobotMemory(assumptions, graphs, merges, self._sense_copied())
+
     def become(self, other: RobotMemory) -> None:
-        """Have the ATGs and merges of another memory, under the same assumptions, instead of one's own."""
+        """Have the assumptions, ATGs and merges of another memory instead of one's own."""
+        self.assumptions = other.assumptions
         self._graphs, self._merges, self.sense = dict(other._graphs), list(other._merges), other.sense
 
     def copy(self) -> RobotMemory:

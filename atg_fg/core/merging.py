@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from atg_fg.core.aspect_graph import AspectTransitionGraph
+from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.open_alphabets import Relabelling
 
 
 @dataclass(frozen=True)
@@ -25,6 +27,11 @@ class Merge:
     dropped: AspectTransitionGraph
     position: int
     trials: tuple[int, ...] = ()
+
+    def relabelled(self, assumptions: Assumptions, labels: Relabelling) -> Merge:
+        """Return the same merge under assumptions with another alphabet."""
+        kept, dropped = (graph.relabelled(assumptions, labels) for graph in (self.kept, self.dropped))
+        return replace(self, kept=kept, dropped=dropped)
 
     def merged(self) -> AspectTransitionGraph:
         """Return what the two made: all aspects, as far as |G| allows, and the sum of their counts."""

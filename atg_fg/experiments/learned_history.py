@@ -8,8 +8,10 @@ from typing import NamedTuple
 from atg_fg.core.actions import NOTHING, UncertainAction
 from atg_fg.core.looks import strength
 from atg_fg.core.memory import RobotMemory
+from atg_fg.core.open_alphabets import Relabelling
 from atg_fg.core.patterns import Evidence
 from atg_fg.inference.history import History
+from atg_fg.inference.interface import Inference
 
 
 class _Rest(NamedTuple):
@@ -30,13 +32,13 @@ class _Rest(NamedTuple):
 
 
 def learn_history(
-    memory: RobotMemory, history: History, matched: str | None, name: str | None = None, *, taught: bool = False
+    memory: RobotMemory, trial: Inference, matched: str | None, name: str | None = None, *, taught: bool = False
 ) -> str | None:
     """Let a memory learn from a trial, in one transaction if it is kept in a file; return the name of the ATG.
 
     Args:
-        memory: What learns.
-        history: What was seen and done.
+        memory: What learns; labels that it did not know when the trial began are added to its open alphabet.
+        trial: What was seen and done.
         matched: Name of the ATG that the object is of, ``None`` if it is new.
         name: Of the ATG of a new object; the next number if not given.
         taught: Whether someone said of which object the trial is.
@@ -44,11 +46,13 @@ def learn_history(
     Returns:
         ``None`` if no pattern was seen whole, so that nothing was learned.
     """
-    rests = list(_rests(history))
-    patterns = [rest.pattern for rest in rests]
-    if all(pattern is None for pattern in patterns):
+    if all(look.pattern is None for look in trial.history.evidence):
         return None
+    alphabet = trial.memory.assumptions.alphabet
     with memory.transaction():
+        memory.extend(alphabet.names)
+        rests = list(_rests(trial.history, Relabelling(alphabet, memory.assumptions.alphabet)))
+        patterns = [rest.pattern for rest in rests]
         learned = memory.learn(patterns, [rest.action for rest in rests[:-1]], matched, name)
         for piece in _pieces(rests):
             looks = [rest.strongest for rest in piece]
@@ -60,11 +64,11 @@ def learn_history(
     return learned
 
 
-def _rests(history: History) -> Iterator[_Rest]:
-    """Yield the looks of each aspect."""
+def _rests(history: History, labels: Relabelling) -> Iterator[_Rest]:
+    """Yield the looks of each aspect, under the new labels."""
     looks: list[Evidence] = []
     for time, look in enumerate(history.evidence):
-        looks.append(look)
+        looks.append(look if labels.new == labels.old else labels.evidence(look))
         action = history.actions[time] if time + 1 < len(history.evidence) else None
         if action != NOTHING:
             yield _Rest(looks, None if isinstance(action, UncertainAction) else action)

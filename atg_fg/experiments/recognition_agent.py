@@ -160,7 +160,8 @@ class RecognitionAgent:
         """Take in what is seen without acting on it; several looks may follow each other.
 
         Args:
-            look: As for ``Inference.observe``; or what worlds show, as for ``predict``.
+            look: As for ``Inference.observe``; or what worlds show, as for ``predict``. A label that the memory's open
+                alphabet does not know is known in this trial, and added to the memory when that learns from it.
             episode_start: As for ``predict``.
             independent: As for ``Inference.observe``.
 
@@ -237,7 +238,7 @@ class RecognitionAgent:
         matched = name if name is not None and name in self.memory.names else verdict.name if name is None else None
         if matched is not None and matched not in self.memory.names:
             matched = None  # another process has given its trials to other objects meanwhile
-        learned = learn_history(self.memory, trial.history, matched, name, taught=name is not None)
+        learned = learn_history(self.memory, trial, matched, name, taught=name is not None)
         self.reset()
         return learned
 
@@ -252,10 +253,12 @@ class RecognitionAgent:
                 f"(worlds, {len(alphabet.slots)})"
             )
         detections = [detection_of(row) for row in np.atleast_2d(rows)]
-        evidence = [Evidence.of_detection(alphabet, detection) for detection in detections]
-        self._begin_trials(len(evidence), episode_start)
-        for inference, each in zip(self.trials, evidence, strict=True):
-            inference.observe(each, independent=independent)
+        known = [trial.memory.assumptions.alphabet for trial in self.trials] or [alphabet] * len(detections)
+        for detection, each in zip(detections, known, strict=False):
+            each.check_detection(detection)
+        self._begin_trials(len(detections), episode_start)
+        for inference, detection in zip(self.trials, detections, strict=True):
+            inference.observe(detection, independent=independent)
         return rows
 
     def _begin_trials(self, n_worlds: int, episode_start: ArrayLike | None) -> None:

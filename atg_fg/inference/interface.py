@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from copy import copy, deepcopy
 from types import MappingProxyType
 from typing import Any, ClassVar, NamedTuple, Self
@@ -15,6 +15,7 @@ from atg_fg.core.belief import SHOWN, BeliefTable, IdentityBelief
 from atg_fg.core.errors import ImpossibleEvidenceError, InvalidInputError
 from atg_fg.core.looks import Look, evidence_of, strength
 from atg_fg.core.memory import RobotMemory
+from atg_fg.core.open_alphabets import Relabelling, new_labels
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, FloatArray, protect
 from atg_fg.core.records import Mistake
@@ -38,6 +39,13 @@ class TrialSetup(NamedTuple):
     memory: RobotMemory
     parameters: ModelParameters
     prior: IdentityBelief | None = None
+
+
+class _Told(NamedTuple):
+    """A look as it was told, so that it can be read again under an alphabet that knows more labels."""
+
+    look: Look
+    independent: bool
 
 
 class Inference(ABC):
@@ -74,6 +82,7 @@ class Inference(ABC):
         self.model = self.make_tables()
         self.history = History()
         self._log_scale = 0.0
+        self._told: list[_Told | AnyAction] = []
 
     def make_tables(self) -> RecognitionModel:
         """Return the tables in force when the trial begins; an engine that does without some of them overrides this."""
@@ -92,7 +101,9 @@ class Inference(ABC):
     def observe(self, look: Look, *, independent: bool = True) -> None:
         """Take in the evidence z_t of a look, then learn from it if the parameters say so.
 
-        Several looks may follow each other without an action: they are of one aspect, X_t.
+        Several looks may follow each other without an action: they are of one aspect, X_t. A label that an open
+        alphabet does not know is added to it: ``memory`` is then one of its own that knows it, and all is as if the
+        label had been known when the trial began.
 
         Args:
             look: Evidence; the symbol in each slot, by number or name; symbols or their likelihoods by slot; or
@@ -104,7 +115,12 @@ class Inference(ABC):
             InvalidInputError: The look does not fit the alphabet.
             ImpossibleEvidenceError: The evidence has probability zero under the model; nothing has changed.
         """
-        evidence = evidence_of(self.memory.assumptions.alphabet, look)
+        alphabet = self.memory.assumptions.alphabet
+        labels = new_labels(alphabet, look)
+        if labels:
+            self._meet(labels, look, independent=independent)
+            return
+        evidence = evidence_of(alphabet, look)
         evidence.check(self.model.n_patterns)
         if self.history.awaits_evidence:
             self._take_in(evidence)
@@ -112,6 +128,33 @@ class Inference(ABC):
             self._look_again(evidence)
         else:
             self._keep_the_strongest(evidence)
+        if alphabet.is_open:
+            self._told.append(_Told(deepcopy(look), independent))
+
+    def _meet(self, labels: Iterable[str], look: Look, *, independent: bool) -> None:
+        """Begin again under an alphabet that knows more labels, and take in the look that has them."""
+        again = self._anew(self.memory.extended(labels))
+        to = Relabelling(self.memory.assumptions.alphabet, again.memory.assumptions.alphabet)
+        for told in self._told:
+            if not isinstance(told, _Told):
+                again._do(told)
+                again._told.append(told)
+            elif isinstance(told.look, Evidence):
+                again.observe(to.evidence(told.look), independent=told.independent)
+            else:
+                again.observe(told.look, independent=told.independent)
+        again.observe(look, independent=independent)
+        self._become(again)
+
+    def _anew(self, memory: RobotMemory) -> Self:
+        """Return this engine, with its options, at the beginning of the trial."""
+        again = type(self)(TrialSetup(memory, self.parameters, self.prior), **self.options)
+        again.options = self.options
+        return again
+
+    def _become(self, again: Self) -> None:
+        vars(self).clear()
+        vars(self).update(vars(again))
 
     def _look_again(self, evidence: Evidence) -> None:
         """Take in a look at what was looked at before: nothing happened since."""
@@ -129,14 +172,13 @@ class Inference(ABC):
         rest = self.history.looks_at_rest()
         if max(strength(self.history.evidence[time]) for time in rest) >= strength(evidence):
             return
-        again = type(self)(TrialSetup(self.memory, self.parameters, self.prior), **self.options)
-        again.options = self.options
+        again = self._anew(self.memory)
+        again._told = self._told
         for time, look in enumerate([*self.history.evidence[: rest[0]], evidence]):
             if time:
                 again._do(self.history.actions[time - 1])
             again._take_in(look)
-        vars(self).clear()
-        vars(self).update(vars(again))
+        self._become(again)
 
     def _take_in(self, evidence: Evidence) -> None:
         evidence, log_scale = evidence.scaled()
@@ -162,7 +204,10 @@ class Inference(ABC):
         """
         if self.history.awaits_evidence:
             raise InvalidInputError("trial: an action without an observation before it; expected an observation")
-        self._do(action_from(action, self.memory.assumptions))
+        done = action_from(action, self.memory.assumptions)
+        self._do(done)
+        if self.memory.assumptions.alphabet.is_open:
+            self._told.append(done)
 
     def _do(self, action: AnyAction) -> None:
         self.history.actions.append(action)

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.open_alphabets import Relabelling
 from atg_fg.core.patterns import (
     MISSING,
     Confidences,
@@ -60,6 +61,11 @@ class RawTrial:
             confidences if any(confidences) else (),
             tuple(likelihoods) if any(likelihoods) else (),
         )
+
+    def relabelled(self, labels: Relabelling) -> RawTrial:
+        """Return the same trial under another alphabet."""
+        detections = tuple(map(labels.detection, self.detections))
+        return replace(self, detections=detections, likelihoods=tuple(map(labels.slots, self.likelihoods)))
 
     def check(self, assumptions: Assumptions, place: str = "trial") -> None:
         """Raise ``InvalidInputError``, naming ``place``, if this is no trial under these assumptions."""

@@ -15,6 +15,7 @@ from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.merging import Merge
+from atg_fg.core.open_alphabets import Relabelling
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Confidences, Detection, SlotLikelihoods
 from atg_fg.core.sense import Sense, SensedTrial
@@ -273,8 +274,19 @@ class StructuredMemory(RobotMemory):
             for each in self._reassignments
         ]
 
+    def _under(self, assumptions: Assumptions, labels: Relabelling) -> StructuredMemory:
+        """Return a memory of the same under another alphabet; what was sampled is sampled again when asked for."""
+        plain, known = super()._under(assumptions, labels), self.learner
+        learner = StructureLearner(assumptions, known.seed, known.plan)
+        learner.n_evaluations = known.n_evaluations
+        trials = [trial.relabelled(labels) for trial in known.trials]
+        learner.restore(known.owners, trials, known.candidates, known.rates)
+        memory = StructuredMemory(assumptions, plain, learner, plain.merges, plain.sense)
+        memory.restore_evidence(None, self._gain, self._reassignments)
+        return memory
+
     def become(self, other: RobotMemory) -> None:
-        """Have what another memory has, under the same assumptions; if that has no structure, none is learned yet."""
+        """Have what another memory has; if that has no structure, none is learned yet."""
         super().become(other)
         known = other.learner if isinstance(other, StructuredMemory) else None
         self.learner = known or StructureLearner(self.assumptions)

@@ -87,7 +87,8 @@ def open_memory(
 
     Args:
         path: The database.
-        assumptions: Of a new memory, if there is none yet; they must be those of the one that is there.
+        assumptions: Of a new memory, if there is none yet; they must be those of the one that is there, which may have
+            met labels since that its open alphabet did not know.
         read_only: Refuse changes.
         wait: Seconds to wait for another writer.
 
@@ -104,7 +105,7 @@ def open_memory(
                     if not holds_memory(connection):
                         replace_memory(connection, RobotMemory(assumptions))
             memory = read_memory_rows(connection, str(path))
-            if assumptions is not None and memory.assumptions != assumptions:
+            if assumptions is not None and not memory.assumptions.extends(assumptions):
                 raise InvalidInputError(f"{path}: was made under other assumptions: {memory.assumptions}")
             memory._keeper = DatabaseKeeper(connection, str(path), memory, read_only=read_only)
         except BaseException:

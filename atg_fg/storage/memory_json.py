@@ -50,23 +50,6 @@ def memory_to_document(memory: RobotMemory) -> dict[str, Any]:
     return document
 
 
-def extended_memory(memory: RobotMemory, assumptions: Assumptions) -> RobotMemory:
-    """Return a memory under assumptions with more symbols; what was sampled is sampled again when it is asked for.
-
-    It is the memory itself if it has all of them.
-
-    Raises:
-        InvalidInputError: The assumptions differ in something else.
-    """
-    if assumptions == memory.assumptions:
-        return memory
-    document = memory_to_document(memory)
-    document["assumptions"] = write_assumptions(assumptions)
-    structure = document.get("structure", {})
-    structure.pop("evidence", None)
-    return memory_from_document(document)
-
-
 def memory_from_document(value: Any, place: str = "memory") -> RobotMemory:
     """Return the robot memory in a document; errors name ``place``.
 

@@ -14,8 +14,9 @@ from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import MISSING, PatternAlphabet
 from atg_fg.experiments.exploration import complete_memory
 from atg_fg.experiments.recognition_agent import RecognitionAgent
+from atg_fg.learning.structured_memory import memory_for
 from atg_fg.policies import StoppingPolicy, make_policy
-from atg_fg.storage.memory_files import open_memory
+from atg_fg.storage.memory_files import load_memory, open_memory
 from atg_fg.storage.presets import preset
 from atg_fg.worlds.arcube import make_arcubes
 from atg_fg.worlds.arcube_world import ARcubeWorld
@@ -211,6 +212,49 @@ class TestALoopOfOnesOwn:
         assert agent.verdict.verdict == "undecided"
         assert agent.learn() is None
         assert len(named) == 0
+
+    def test_labels_that_nobody_knew_are_learned_with_the_trial(self):
+        alphabet = PatternAlphabet.named(("front", "top"), ("logo", "lid"), exclusive=False, is_open=True)
+        memory = RobotMemory(Assumptions(5, 4, ("turn",), alphabet))
+        agent = RecognitionAgent(memory, ModelParameters())
+        for trial in range(2):
+            agent.observe(("logo", "lid"))
+            agent.did("turn")
+            agent.observe({"front": "barcode", "top": "lid"})
+            agent.observe(np.array([2, MISSING]))
+            assert agent.next_action().action == "turn"
+            assert agent.verdict.verdict == ("known" if trial else "novel")
+            assert memory.assumptions.alphabet.names == (("logo", "lid", "barcode") if trial else ("logo", "lid"))
+            agent.learn("cup")
+        assert memory["cup"].aspects == ((0, 1), (2, 1))
+        assert memory["cup"].counts == {(0, 0, 1): 2}
+
+    def test_two_robots_may_meet_labels_in_another_order(self, tmp_path):
+        alphabet = PatternAlphabet.named(("front", "top"), ("logo", "lid"), exclusive=False, is_open=True)
+        assumptions, parameters = Assumptions(5, 4, ("turn",), alphabet), preset("learned")
+        path = tmp_path / "robot.db"
+        with (
+            memory_for(parameters, open_memory(path, assumptions)) as one,
+            memory_for(parameters, open_memory(path, assumptions)) as other,
+        ):
+            agents = [RecognitionAgent(memory, parameters, engine="learned-structure") for memory in (one, other)]
+            for agent, new in zip(agents, ("seal", "base"), strict=True):
+                agent.observe({"front": {"lid": 0.5, "logo": 0.2}, "top": "lid"})
+                agent.did("turn")
+                agent.observe((new, "lid"))
+                agent.did("turn")
+                agent.observe(("logo", new))
+            assert [agent.learn(name) for agent, name in zip(agents, ("cup", "box"), strict=True)] == ["cup", "box"]
+            one.refresh()
+            assert one == other == load_memory(path)
+        names = ("logo", "lid", "seal", "base")
+        assert one.assumptions.alphabet.names == names
+        assert [[tuple(names[symbol] for symbol in aspect) for aspect in graph.aspects] for graph in one] == [
+            [(new, "lid"), ("logo", new)] for new in ("seal", "base")
+        ]
+        # What a look left to all other labels went to the new one; what came later is as improbable as the least.
+        likelihoods = [trial.likelihoods[0][0] for trial in one.learner.trials]
+        np.testing.assert_allclose(likelihoods, [(0.2, 0.5, 0.3, 0.2), (0.2, 0.5, 0.2, 0.3)])
 
     def test_two_processes_share_a_memory(self, named, tmp_path):
         path = tmp_path / "robot.db"

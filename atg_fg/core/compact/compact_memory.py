@@ -15,6 +15,7 @@ from atg_fg.core.compact.size_classes import SizeClasses
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.merging import Merge
+from atg_fg.core.open_alphabets import Relabelling
 from atg_fg.core.patterns import IntArray
 
 
@@ -215,6 +216,14 @@ class CompactMemory(RobotMemory):
 
     def _refuse_merges(self) -> NoReturn:
         raise InvalidInputError("merge: a compact memory keeps no record of merges; expected a memory file in JSON")
+
+    def _under(self, assumptions: Assumptions, labels: Relabelling) -> CompactMemory:
+        return CompactMemory.of(super()._under(assumptions, labels))
+
+    def become(self, other: RobotMemory) -> None:
+        """Have the assumptions and ATGs of another memory instead of one's own."""
+        self.assumptions, arrays = other.assumptions, CompactMemory.of(other).arrays()
+        self._fill(other.names, arrays)
 
     def copy(self) -> CompactMemory:
         """Return a memory that can learn without touching this one."""

@@ -16,7 +16,7 @@ from atg_fg.learning.structured_memory import StructuredMemory
 from atg_fg.storage.database import trial_rows
 from atg_fg.storage.database.connection import roll_back, translated
 from atg_fg.storage.database.memory_reading import read_memory_rows
-from atg_fg.storage.database.memory_writing import held_by, write_changes
+from atg_fg.storage.database.memory_writing import held_by, replace_memory, write_changes
 
 
 class DatabaseKeeper:
@@ -50,9 +50,13 @@ class DatabaseKeeper:
         self._inside = True
         try:
             self._take_over(memory)
+            assumptions = memory.assumptions
             yield
             with translated(self._place):
-                held = write_changes(self._connection, memory, self._held)
+                if memory.assumptions == assumptions:
+                    held = write_changes(self._connection, memory, self._held)
+                else:
+                    held = replace_memory(self._connection, memory)
                 self._connection.execute("COMMIT")
             self._held = held
         except BaseException:
@@ -109,7 +113,7 @@ class DatabaseKeeper:
             raise InvalidInputError(
                 f"{self._place}: another process has begun to learn structure in it; expected it to be opened anew"
             )
-        if loaded.assumptions != memory.assumptions:
+        if not loaded.assumptions.extends(memory.assumptions):
             raise InvalidInputError(f"{self._place}: another process has put another memory in it")
         memory.become(loaded)
         self._held = held_by(self._connection, memory)

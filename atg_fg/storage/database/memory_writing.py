@@ -9,9 +9,9 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from atg_fg.core.aspect_graph import AspectTransitionGraph
-from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.merging import Merge
+from atg_fg.core.patterns import PatternAlphabet
 from atg_fg.core.sense import SensedTrial
 from atg_fg.learning.raw_trials import RawTrial
 from atg_fg.learning.structured_memory import StructuredMemory
@@ -72,7 +72,8 @@ def replace_memory(connection: sqlite3.Connection, memory: RobotMemory) -> Held:
         connection.execute("UPDATE trials SET learned = NULL")
     alphabet = assumptions.alphabet
     connection.execute(
-        "INSERT INTO assumptions VALUES (1, ?, ?, ?, ?, ?)", (assumptions.n_objects, *_sizes(assumptions))
+        "INSERT INTO assumptions VALUES (1, ?, ?, ?, ?, ?)",
+        (assumptions.n_objects, assumptions.n_aspects, alphabet.n_symbols, *_flags(alphabet)),
     )
     connection.executemany("INSERT INTO actions VALUES (?, ?)", enumerate(assumptions.actions))
     connection.executemany("INSERT INTO slots VALUES (?, ?)", enumerate(alphabet.slots))
@@ -87,20 +88,22 @@ def replace_memory(connection: sqlite3.Connection, memory: RobotMemory) -> Held:
 
 
 def _assumptions_differ(connection: sqlite3.Connection, memory: RobotMemory) -> bool:
-    """Return whether the database holds a memory under other assumptions."""
+    """Return whether the database holds a memory under other assumptions; labels more at the end are none."""
     alphabet = memory.assumptions.alphabet
     row = connection.execute("SELECT n_aspects, n_symbols, exclusive, open FROM assumptions").fetchone()
     names = [
         tuple(name for (name,) in connection.execute(f"SELECT name FROM {table} ORDER BY number"))
         for table in ("actions", "slots", "symbols")
     ]
-    new = [_sizes(memory.assumptions), memory.assumptions.actions, alphabet.slots, alphabet.names]
-    return row is not None and [row, *names] != new
+    if row is None:
+        return False
+    known = alphabet.names[: row[1]] if alphabet.is_open else alphabet.names
+    sizes = (memory.assumptions.n_aspects, row[1] if alphabet.is_open else alphabet.n_symbols, *_flags(alphabet))
+    return [row, *names] != [sizes, memory.assumptions.actions, alphabet.slots, known]
 
 
-def _sizes(assumptions: Assumptions) -> tuple[int, ...]:
-    alphabet = assumptions.alphabet
-    return assumptions.n_aspects, alphabet.n_symbols, int(alphabet.exclusive), int(alphabet.is_open)
+def _flags(alphabet: PatternAlphabet) -> tuple[int, int]:
+    return int(alphabet.exclusive), int(alphabet.is_open)
 
 
 def write_changes(connection: sqlite3.Connection, memory: RobotMemory, held: Held) -> Held:
