@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from atg_fg.core.looks import likely_pattern
 from atg_fg.core.patterns import Confidences, Detection, Evidence, PatternAlphabet
 
 
@@ -34,3 +35,12 @@ def evidence_in(alphabet: PatternAlphabet, detection: Detection, info: Mapping[s
     if not any(likelihoods):
         return Evidence.of_detection(alphabet, detection, confidences_in(info))
     return Evidence.of_slots(alphabet, likelihoods, detection, confidences_in(info))
+
+
+def pattern_to_learn(
+    alphabet: PatternAlphabet, detection: Detection, pattern: int | None, info: Mapping[str, Any]
+) -> int | None:
+    """Return the pattern to learn from, also where there are likelihoods; a sense says itself what is clear."""
+    if pattern is not None or info.get("readings") or not any(info.get("likelihoods") or ()):
+        return pattern
+    return likely_pattern(evidence_in(alphabet, detection, info))

@@ -61,6 +61,14 @@ def _weights(alphabet: PatternAlphabet, slot: str, given: Mapping[Any, Any]) -> 
     return np.where(silent, rest / max(int(silent.sum()), 1), stated)
 
 
+def likely_pattern(evidence: Evidence) -> int | None:
+    """Return the pattern to learn from: the one seen whole, or that a likelihood alone makes more probable than not."""
+    if evidence.pattern is not None or (evidence.detection is not None and not any(evidence.slots)):
+        return evidence.pattern
+    best = int(evidence.likelihood.argmax())
+    return best if evidence.likelihood[best] > evidence.likelihood.sum() / 2 else None
+
+
 def strength(evidence: Evidence) -> float:
     """Return how much a look says: minus the entropy of its likelihood as a distribution, nats; 0 is sure."""
     share = evidence.likelihood / evidence.likelihood.sum()

@@ -165,21 +165,26 @@ class RobotMemory(Persistent):
             if (
                 touched
                 and name in self._graphs
-                and self._graphs[name] == self._made_of(name, [(old, actions) for old, _, actions in trials])
+                and self._graphs[name]
+                == self._made_of(name, [(self._patterns(old), actions) for old, _, actions in trials])
             ):
-                self._graphs[name] = self._made_of(name, [(new, actions) for _, new, actions in trials])
+                self._graphs[name] = self._made_of(name, [(self._patterns(new), actions) for _, new, actions in trials])
 
     def _owners_of(self, trials: Sequence[SensedTrial]) -> list[str]:
         """Return the name of the ATG that each trial is of."""
         return [trial.owner for trial in trials]
 
-    def _made_of(self, name: str, trials: Iterable[tuple[Sequence[Detection], Sequence[int]]]) -> AspectTransitionGraph:
-        """Return the ATG that detections and actions of some trials make."""
+    def _made_of(
+        self, name: str, trials: Iterable[tuple[Sequence[int | None], Sequence[int]]]
+    ) -> AspectTransitionGraph:
+        """Return the ATG that patterns and actions of some trials make."""
         graph = AspectTransitionGraph(name, self.assumptions)
-        for detections, actions in trials:
-            patterns = [Evidence.of_detection(self.assumptions.alphabet, each).pattern for each in detections]
-            graph.learn(patterns, list(actions))
+        for patterns, actions in trials:
+            graph.learn(patterns, actions)
         return graph
+
+    def _patterns(self, detections: Iterable[Detection]) -> list[int | None]:
+        return [Evidence.of_detection(self.assumptions.alphabet, each).pattern for each in detections]
 
     @one_transaction
     def rename(self, old: str, new: str) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.core.look_info import confidences_in, confidences_of, truth_of
+from atg_fg.core.look_info import confidences_in, confidences_of, pattern_to_learn, truth_of
 from atg_fg.core.patterns import Confidences, Detection, Evidence, FloatArray
 from atg_fg.core.table import Bar, Cell, Table, shortened
 
@@ -138,7 +138,7 @@ class TrialRecord:
         """How the trial ended: ``undecided`` if nothing at all was seen, ``lost`` if the world lost the object."""
         if self.lost_truth is not None:
             return "lost"
-        if all(symbol is None for step in self.steps for symbol in step.detection):
+        if not any(step.truth.get("likelihoods") or set(step.detection) - {None} for step in self.steps):
             return "undecided"
         return "novel" if self.belief.is_novel else "known"
 
@@ -277,7 +277,8 @@ class TrialSummary:
         Args:
             record: Of the trial.
             learned: Name of the ATG that it went to.
-            learned_patterns: Index of the pattern to learn from at each look; those seen if not given.
+            learned_patterns: Index of the pattern to learn from at each look. If not given, those seen whole, and those
+                that a likelihood alone makes more probable than not.
         """
         names = record.assumptions.actions
         steps = [
@@ -296,7 +297,11 @@ class TrialSummary:
             )
             for step in record.steps
         ]
-        patterns = None if learned_patterns is None else tuple(learned_patterns)
+        if learned_patterns is None:
+            alphabet = record.assumptions.alphabet
+            looks = ((step.detection, step.pattern, step.truth) for step in record.steps)
+            learned_patterns = [pattern_to_learn(alphabet, *look) for look in looks]
+        patterns: tuple[int | None, ...] | None = tuple(learned_patterns)
         if patterns == tuple(record.patterns):
             patterns = None
         return cls(

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import NamedTuple
 
 from atg_fg.core.actions import NOTHING, UncertainAction
-from atg_fg.core.looks import strength
+from atg_fg.core.looks import likely_pattern, strength
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.open_alphabets import Relabelling
 from atg_fg.core.patterns import Evidence
@@ -22,8 +22,9 @@ class _Rest(NamedTuple):
 
     @property
     def pattern(self) -> int | None:
-        """The first pattern that was seen whole."""
-        return next((look.pattern for look in self.looks if look.pattern is not None), None)
+        """The first pattern that was seen whole, or that the strongest look makes more probable than not."""
+        whole = next((look.pattern for look in self.looks if look.pattern is not None), None)
+        return likely_pattern(self.strongest) if whole is None else whole
 
     @property
     def strongest(self) -> Evidence:
@@ -44,9 +45,9 @@ def learn_history(
         taught: Whether someone said of which object the trial is.
 
     Returns:
-        ``None`` if no pattern was seen whole, so that nothing was learned.
+        ``None`` if no pattern was seen whole or made more probable than not, so that nothing was learned.
     """
-    if all(look.pattern is None for look in trial.history.evidence):
+    if all(likely_pattern(look) is None for look in trial.history.evidence):
         return None
     alphabet = trial.memory.assumptions.alphabet
     with memory.transaction():

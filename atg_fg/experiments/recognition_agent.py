@@ -229,7 +229,7 @@ class RecognitionAgent:
             name: Of the object, if someone has said it; else it is that of the verdict, or a new one.
 
         Returns:
-            ``None`` if there was nothing to learn: no pattern was seen whole.
+            ``None`` if there was nothing to learn: no pattern was seen whole, or made more probable than not.
 
         Raises:
             InvalidInputError: Nothing has been seen since the last reset.

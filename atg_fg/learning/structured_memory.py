@@ -13,6 +13,8 @@ import numpy as np
 from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.look_info import evidence_in
+from atg_fg.core.looks import likely_pattern
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.merging import Merge
 from atg_fg.core.open_alphabets import Relabelling
@@ -192,7 +194,16 @@ class StructuredMemory(RobotMemory):
     def _estimated(self, name: str) -> AspectTransitionGraph:
         """Return the ATG that the raw trials of a name make."""
         trials = zip(self.learner.trials, self.learner.owners, strict=True)
-        return self._made_of(name, ((trial.detections, trial.actions) for trial, owner in trials if owner == name))
+        own = (trial for trial, owner in trials if owner == name)
+        return self._made_of(name, ((self._patterns_of(trial), trial.actions) for trial in own))
+
+    def _patterns_of(self, trial: RawTrial) -> list[int | None]:
+        """Return the patterns of a trial to learn from."""
+        if self.sense is not None or not trial.likelihoods:
+            return self._patterns(trial.detections)
+        looks = zip(trial.detections, trial.likelihoods, strict=True)
+        alphabet = self.assumptions.alphabet
+        return [likely_pattern(evidence_in(alphabet, seen, {"likelihoods": slots})) for seen, slots in looks]
 
     def _owners_of(self, trials: Sequence[SensedTrial]) -> list[str]:
         """Return the name of the ATG that each trial is of: raw trials may have changed hands."""

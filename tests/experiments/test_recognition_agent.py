@@ -213,18 +213,26 @@ class TestALoopOfOnesOwn:
         assert agent.learn() is None
         assert len(named) == 0
 
+    def test_likelihoods_alone_are_learned_where_they_make_a_pattern_more_probable_than_not(self, named):
+        agent = RecognitionAgent(named, ModelParameters())
+        agent.observe({"front": {"tag-1": 0.8}, "top": "tag-2"})
+        agent.did("left")
+        agent.observe({"front": {"tag-3": 0.3}, "top": "tag-2"})
+        assert agent.learn() == "object-000"
+        assert named["object-000"].aspects == ((1, 2),)
+
     def test_labels_that_nobody_knew_are_learned_with_the_trial(self):
         alphabet = PatternAlphabet.named(("front", "top"), ("logo", "lid"), exclusive=False, is_open=True)
         memory = RobotMemory(Assumptions(5, 4, ("turn",), alphabet))
         agent = RecognitionAgent(memory, ModelParameters())
-        for trial in range(2):
+        for number in range(2):
             agent.observe(("logo", "lid"))
             agent.did("turn")
             agent.observe({"front": "barcode", "top": "lid"})
             agent.observe(np.array([2, MISSING]))
             assert agent.next_action().action == "turn"
-            assert agent.verdict.verdict == ("known" if trial else "novel")
-            assert memory.assumptions.alphabet.names == (("logo", "lid", "barcode") if trial else ("logo", "lid"))
+            assert agent.verdict.verdict == ("known" if number else "novel")
+            assert memory.assumptions.alphabet.names == (("logo", "lid", "barcode") if number else ("logo", "lid"))
             agent.learn("cup")
         assert memory["cup"].aspects == ((0, 1), (2, 1))
         assert memory["cup"].counts == {(0, 0, 1): 2}

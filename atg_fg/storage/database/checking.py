@@ -10,6 +10,7 @@ from pathlib import Path
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
+from atg_fg.learning.structured_memory import StructuredMemory
 from atg_fg.storage.database.connection import open_to_read, translated
 from atg_fg.storage.database.memory_reading import holds_memory, read_memory_rows
 from atg_fg.storage.database.trial_log import TEST_KIND
@@ -61,6 +62,8 @@ def _memory(connection: sqlite3.Connection, place: str) -> Iterator[str]:
 def _strange_records(connection: sqlite3.Connection, place: str, memory: RobotMemory) -> Iterator[str]:
     """Yield what trials that this memory learned from say that does not fit it."""
     names = {*memory.names, *(merge.dropped.name for merge in memory.merges)}
+    if isinstance(memory, StructuredMemory):  # an ATG all of whose trials turned out to be of others is no more
+        names |= {each.old for each in memory.reassignments}
     n_slots, n_symbols = len(memory.assumptions.alphabet.slots), memory.assumptions.alphabet.n_symbols
     for _, trial in trials_or_faults(connection, place, {}):
         if isinstance(trial, InvalidInputError) or trial.learned is None:

@@ -4,7 +4,9 @@ from contextlib import closing
 import pytest
 
 from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.parameters import ModelParameters
 from atg_fg.experiments.trial import learn_from
+from atg_fg.learning.structured_memory import memory_for
 from atg_fg.storage.database.checking import faults_of_database
 from atg_fg.storage.memory_files import open_memory
 from tests.storage.database.small import ARCUBES, a_record
@@ -27,6 +29,15 @@ def change(path, statement):
 
 
 def test_a_sound_database_has_no_faults(path):
+    assert faults_of_database(path) == []
+
+
+def test_a_trial_that_changed_hands_is_no_fault(tmp_path):
+    path = tmp_path / "robot.db"
+    with memory_for(ModelParameters(learn_structure=True), open_memory(path, ARCUBES)) as memory:
+        assert [learn_from(a_record(seed), memory) for seed in range(2)] == ["object-000", "object-001"]
+        memory.reassign({1: "object-000"})
+        assert memory.names == ("object-000",)
     assert faults_of_database(path) == []
 
 
