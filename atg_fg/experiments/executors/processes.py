@@ -49,7 +49,8 @@ class WorkerProcesses:
                 return self._begin(worker, function, piece)
             except BrokenProcessPool:  # it died while it was idle
                 worker.pool.shutdown()
-        self._all.append(_Worker())
+        with _start_of_process():
+            self._all.append(_Worker())
         return self._begin(self._all[-1], function, piece)
 
     def _begin(self, worker: _Worker, function: Callable[[Any], Any], piece: Any) -> Future[Any]:
@@ -123,19 +124,41 @@ def _start_of_process() -> Iterator[None]:
     """Let processes that are begun in a ``with`` block have one thread for linear algebra, and ignore Ctrl-C.
 
     Both are inherited, and so hold from the first moment; what the user has set in the environment stays. A terminal
-    sends Ctrl-C to all processes, but only this one shall answer.
+    sends Ctrl-C to all processes, but only this one shall answer, and not before the block has ended: a process that
+    was told only a half of what it is to do would complain.
     """
     added = {name: value for name, value in _ONE_THREAD.items() if name not in os.environ}
     os.environ.update(added)
     blockable = hasattr(signal, "pthread_sigmask")  # not on Windows
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if blockable else None
+    with _answered_later():
+        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if blockable else None
+        try:
+            yield
+        finally:
+            for name in added:
+                del os.environ[name]
+            if before is not None:
+                signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+@contextmanager
+def _answered_later() -> Iterator[None]:
+    """Answer Ctrl-C after the block.
+
+    To block the signal is not enough: then another thread takes it, and Python answers it in this one all the same.
+    """
+    answer = signal.getsignal(signal.SIGINT)
+    if not callable(answer) or threading.current_thread() is not threading.main_thread():
+        yield  # nobody answers, or another thread does
+        return
+    met: list[int] = []
+    signal.signal(signal.SIGINT, lambda number, _: met.append(number))
     try:
         yield
     finally:
-        for name in added:
-            del os.environ[name]
-        if before is not None:
-            signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.signal(signal.SIGINT, answer)
+        if met:
+            signal.raise_signal(signal.SIGINT)
 
 
 def _prepare(steps: Any) -> None:

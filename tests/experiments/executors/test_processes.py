@@ -1,0 +1,69 @@
+"""Ctrl-C that meets a worker which is just being spawned: answered when it has all that it needs, and not before."""
+
+import multiprocessing.util
+import os
+import signal
+import threading
+from contextlib import closing
+
+import pytest
+
+from atg_fg.experiments.executors.processes import WorkerProcesses
+from tests import pieces
+from tests.dask_cluster import wait_for
+
+pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+
+
+@pytest.fixture
+def interrupted_spawning(monkeypatch):
+    """Let Ctrl-C come when a process has been spawned and told nothing yet, to whichever thread takes it."""
+    asleep = threading.Event()
+    thread = threading.Thread(target=asleep.wait)
+    thread.start()
+    spawn, begun = multiprocessing.util.spawnv_passfds, []
+
+    def spawn_interrupted(path, arguments, descriptors):
+        process = spawn(path, arguments, descriptors)
+        if any(b"spawn_main" in os.fsencode(each) for each in arguments):
+            begun.append(process)
+            # The signal is blocked in this thread, so that a terminal's goes to another one.
+            signal.pthread_kill(thread.ident, signal.SIGINT)
+        return process
+
+    monkeypatch.setattr(multiprocessing.util, "spawnv_passfds", spawn_interrupted)
+    yield begun
+    asleep.set()
+    thread.join()
+
+
+def has_ended(process):
+    try:
+        return os.waitpid(process, os.WNOHANG)[0] == process
+    except ChildProcessError:
+        return True  # and somebody has waited for it
+
+
+def test_an_interruption_waits_until_a_worker_has_been_told_what_to_do(interrupted_spawning, capfd):
+    handler = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with closing(WorkerProcesses(2)) as workers, pytest.raises(KeyboardInterrupt):
+            workers.submit(pieces.square, 3)
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, handler)
+    wait_for(lambda: all(map(has_ended, interrupted_spawning)))
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.usefixtures("interrupted_spawning")
+def test_the_worker_is_as_good_as_others_to_who_goes_on_after_an_interruption(capfd):
+    met = []
+    handler = signal.signal(signal.SIGINT, lambda *_: met.append(1))
+    try:
+        with closing(WorkerProcesses(1)) as workers:
+            assert workers.result(workers.submit(pieces.square, 3)) == 9
+    finally:
+        signal.signal(signal.SIGINT, handler)
+    assert met
+    assert capfd.readouterr() == ("", "")
