@@ -40,9 +40,22 @@ def test_memory_1_with_classes_of_appearance() -> None:
     assert memory_json.memory_to_json(memory) == (FORMATS / "memory-1-sense.json").read_text()
 
 
-@pytest.mark.parametrize(
-    "name", ["memory-1.json", "memory-1-structured.json", "memory-1-sense.json", "memory-schema-1.db"]
-)
+def test_memory_1_with_labels() -> None:
+    memory = memory_files.load_memory(FORMATS / "memory-1-labels.json")
+    alphabet = memory.assumptions.alphabet
+    assert (alphabet.is_open, alphabet.names[0]) == (True, "logo")
+    assert memory_json.memory_to_json(memory) == (FORMATS / "memory-1-labels.json").read_text()
+
+
+def test_memory_1_with_evidence() -> None:
+    memory = memory_files.load_memory(FORMATS / "memory-1-evidence.json")
+    assert isinstance(memory, StructuredMemory)
+    saved = memory.evidence.saved()
+    assert saved is not None
+    assert (saved.n_trials, len(memory.learner.trials)) == (3, 3)
+
+
+@pytest.mark.parametrize("name", [path.name for path in sorted(FORMATS.glob("memory-*"))])
 def test_every_memory_goes_into_a_database_and_back(name: str, tmp_path: Path) -> None:
     memory = memory_files.load_memory(FORMATS / name)
     memory_files.save_memory(memory, tmp_path / "robot.db")

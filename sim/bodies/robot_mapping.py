@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import sysconfig
 import tomllib
 from collections.abc import Mapping
@@ -93,7 +94,7 @@ def read_mapping(path: Path) -> tuple[Path, RobotMapping]:
         if not path.is_file() or path.stat().st_size > _MOST_BYTES:
             raise OSError("not a plain file" if path.exists() else "no such file")
         told = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
+    except (OSError, ValueError, RecursionError) as error:
         raise InvalidInputError(f"{path}: cannot be read as a mapping: {error}; expected TOML") from error
     try:
         return _description_named(_text(told, "urdf"), path), _mapping(told)
@@ -174,7 +175,7 @@ def _unit(told: dict[str, Any], key: str) -> FloatArray:
 
 
 def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) < np.inf
+    return isinstance(value, (int, float)) and not isinstance(value, bool) and abs(value) <= sys.float_info.max
 
 
 def nasa_mapping() -> RobotMapping:

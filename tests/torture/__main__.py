@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import signal
+
+# Ctrl-C ends all of it, children too, at once and without a word.
+signal.signal(signal.SIGINT, signal.SIG_DFL)
+
 import argparse
 import os
 import re
-import signal
 import sys
 from collections import Counter
 from collections.abc import Sequence

@@ -39,6 +39,13 @@ _VALUES: tuple[Any, ...] = (
 )
 
 
+#: Kinds that are no text, and those that are a text of their own.
+_BINARY: Final = ("picture", "MCAP bag", "SQLite bag", "bag of ROS 1")
+_NO_JSON: Final = ("UAI model", "UAI evidence", "mapping", "bag metadata")
+#: Texts in which more than words is damaged.
+_INSIDE_TEXT: Final = ("trial record", "ablation log", "URDF", "recorded lines", "recorded table")
+
+
 def mutated(seed: int, number: int, kinds: tuple[str, ...] | None = None) -> tuple[str, bytes]:
     """Return kind and content of a damaged file."""
     rng = random.Random(f"{seed}:{number}")
@@ -48,8 +55,8 @@ def mutated(seed: int, number: int, kinds: tuple[str, ...] | None = None) -> tup
     inside = _INSIDE.get(kind)
     if inside is not None and rng.random() < (0.5 if "database" in kind else 0.8):
         return kind, inside(rng, content)
-    is_text = kind not in _INSIDE or kind in ("trial record", "ablation log", "URDF")
-    if is_text and "UAI" not in kind and kind not in _INSIDE and rng.random() < 0.6:
+    is_text = kind not in _BINARY and (kind not in _INSIDE or kind in _INSIDE_TEXT)
+    if is_text and kind not in (*_NO_JSON, *_INSIDE) and rng.random() < 0.6:
         return kind, _damaged_document(rng, content)
     return kind, _damaged_words(rng, content) if is_text and rng.random() < 0.7 else _damaged_bytes(rng, content)
 
@@ -79,6 +86,37 @@ def _damaged_log(rng: random.Random, content: bytes) -> bytes:
 
 def _damaged_text_log(rng: random.Random, content: bytes) -> bytes:
     return b"".join(line + b"\n" for line in _damaged_lines(rng, content.splitlines()))
+
+
+def _damaged_table_of_text(rng: random.Random, content: bytes) -> bytes:
+    """Return a CSV with cells, columns or rows exchanged, repeated or left out; packed at times."""
+    rows = [line.split(",") for line in content.decode().splitlines()]
+    for _ in range(rng.choice((1, 1, 2, 4))):
+        row, change = rng.randrange(len(rows)), rng.randrange(8)
+        column = rng.randrange(max(1, len(rows[row])))
+        if change < 4:
+            rows[row][column : column + 1] = [rng.choice((*_WORDS, *_CELLS))]
+        elif change == 4:
+            rows[row:row] = [list(rows[row])] * rng.choice((1, 2, 300))
+        elif change == 5 and len(rows) > 1:
+            del rows[row]
+        elif change == 6:
+            rows = [
+                each[:column] + each[column : column + 1] * rng.choice((0, 2, 40)) + each[column + 1 :] for each in rows
+            ]
+        else:
+            other = rng.randrange(len(rows))
+            rows[row], rows[other] = rows[other], rows[row]
+    end, between = rng.choice(("\n", "\n", "\r\n", "\r")), rng.choice((",", ",", ";", "\t"))
+    text = end.join(between.join(row) for row in rows)
+    whole = text.encode("utf-8", "surrogatepass")
+    return packed([whole]) if rng.random() < 0.2 else whole
+
+
+_CELLS: Final = (
+    *('"', '""', '"a""b"', '"two\nlines"', "\r", "a;b", "0,5", "label=", "=x", "label:confidence", "trial", "step"),
+    *("object", "confidence", " ", "\u2028", "+1", "1e0", "-0", "inf", "\u0661", "x" * 1001, "label=x", "=1+1"),
+)
 
 
 def _damaged_packed_document(rng: random.Random, content: bytes) -> bytes:
@@ -316,6 +354,9 @@ _INSIDE |= {
     "database": _damaged_database,
     "structured database": _damaged_database,
     "compact memory": _damaged_arrays,
+    "SQLite bag": _damaged_database,
+    "recorded table": _damaged_table_of_text,
+    "recorded lines": _damaged_text_log,
     "test log": _damaged_log,
     "goal run": _damaged_packed_document,
     "trial record": _damaged_text_log,

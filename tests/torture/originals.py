@@ -10,6 +10,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 
 from atg_fg.core.assumptions import arcube_assumptions
@@ -22,6 +23,7 @@ from atg_fg.experiments.scores import TestResult
 from atg_fg.experiments.table1 import TestPlan, run_tests
 from atg_fg.experiments.trial import learn_from, run_trial
 from atg_fg.policies import EntropyPolicy, RandomPolicy
+from atg_fg.senses.tags import tag_image
 from atg_fg.storage import memory_files, memory_json
 from atg_fg.storage.camera_files import CALIBRATION_FORMAT
 from atg_fg.storage.memory_files import open_memory
@@ -32,10 +34,12 @@ from atg_fg.storage.uai import write_evidence, write_model
 from atg_fg.storage.uai_export import export_trial
 from atg_fg.worlds.arcube import make_arcubes
 from atg_fg.worlds.registry import make_world
+from tests.torture.recorded import recordings
 
 _DATA = Path(__file__).parents[1] / "data"
 _RESULTS = Path(__file__).parents[2] / "results"
 _SCRIPT = _DATA / "scripted_trial.json"
+_DOCS = Path(__file__).parents[2] / "docs"
 _UAI = "MARKOV\n3\n2 3 2\n3\n2 0 1\n1 2\n3 0 1 2\n\n6\n1 2 3 4 5 6.5\n2\n0 1\n12\n" + "0.5 1e-3 2 7 0 1 " * 2 + "\n"
 _TAGS = {
     "format": "atg-fg/tags",
@@ -76,17 +80,25 @@ def originals() -> dict[str, list[bytes]]:
     exported = export_trial(read_script(_SCRIPT.read_text()))
     with tempfile.TemporaryDirectory() as folder:
         logs = _logs(Path(folder))
+    named, sampled = (formats / f"memory-1-{what}.json" for what in ("labels", "evidence"))
     return {
-        "memory": [memory_json.memory_to_json(plain).encode(), (formats / "memory-1.json").read_bytes(), sensed],
-        "structured memory": [(formats / "memory-1-structured.json").read_bytes()],
+        "memory": [
+            *(memory_json.memory_to_json(plain).encode(), (formats / "memory-1.json").read_bytes(), sensed),
+            named.read_bytes(),
+        ],
+        "structured memory": [(formats / "memory-1-structured.json").read_bytes(), sampled.read_bytes()],
         "compact memory": [_compact(plain)],
-        "script": [_SCRIPT.read_bytes(), _long_script()],
+        "script": [_SCRIPT.read_bytes(), _long_script(), (formats / "scripted-trial-2.json").read_bytes()],
         "UAI model": [_UAI.encode(), write_model(exported.model).encode()],
         "UAI evidence": [b"2 0 1 2 0\n", b"1\n1 3 2\n", write_evidence(exported.evidence).encode()],
-        "database": [_database(plain, n_trials=4), (formats / "memory-schema-1.db").read_bytes()],
+        "database": [
+            *(_database(plain, n_trials=4), (formats / "memory-schema-1.db").read_bytes()),
+            _database(memory_files.load_memory(named), n_trials=0),
+        ],
         "structured database": [
             _database(structured, n_trials=0),
             _database(memory_files.load_memory(formats / "memory-1-sense.json"), n_trials=0),
+            _database(memory_files.load_memory(sampled), n_trials=0),
         ],
         "test log": [*logs["test log"], (formats / "test-1.jsonl.gz").read_bytes()],
         "trial record": [_trial_record()],
@@ -101,7 +113,17 @@ def originals() -> dict[str, list[bytes]]:
         "tags": [json.dumps(_TAGS).encode()],
         "calibration": [json.dumps(_CALIBRATION).encode()],
         "URDF": [_ROBOT.encode()],
+        "mapping": [(_DOCS / "baxter.toml").read_bytes()],
+        "picture": [_picture(".png"), _picture(".jpg")],
+        **recordings(),
     }
+
+
+def _picture(kind: str) -> bytes:
+    """A photograph of a tag."""
+    image = np.full((300, 300), 255, dtype=np.uint8)
+    image[75:225, 75:225] = tag_image("DICT_5X5_50", 0, 150)
+    return cv2.imencode(kind, image)[1].tobytes()
 
 
 def _memory(n_trials: int) -> RobotMemory:

@@ -6,11 +6,17 @@ kills it, too.
 
 from __future__ import annotations
 
+import signal
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+import atexit
 import gc
 import json
 import os
 import resource
-import signal
+import shutil
 import subprocess
 import sys
 import tempfile
@@ -19,19 +25,26 @@ from collections import Counter
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import closing
+from dataclasses import replace
+from functools import cache, partial
 from pathlib import Path
 from typing import Any, Final
 
 from atg_fg.core.assumptions import arcube_assumptions
 from atg_fg.core.errors import AtgError
+from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.recordings import Recording
 from atg_fg.experiments.ablation import AblationLog, Cell
 from atg_fg.experiments.goals import GoalRunFile
+from atg_fg.experiments.recorded_trials import recognise
 from atg_fg.experiments.replay import replay
 from atg_fg.experiments.rescore import rescore
 from atg_fg.inference.elimination.queries import log_partition, marginals
 from atg_fg.report.page import page
 from atg_fg.report.reading import read_report
+from atg_fg.senses.tags import TagDetector, Tags
+from atg_fg.senses.video import read_image
 from atg_fg.storage import memory_files, memory_json, plain_files
 from atg_fg.storage.camera_files import read_calibration, read_tags
 from atg_fg.storage.database.checking import faults_of_database
@@ -42,13 +55,17 @@ from atg_fg.storage.growing_file import read_lines
 from atg_fg.storage.memory_files import open_memory
 from atg_fg.storage.presets import preset
 from atg_fg.storage.recorded_test import recorded_tests
+from atg_fg.storage.recordings import check_recording, read_recording, read_spec, write_recording
+from atg_fg.storage.rosbag_recordings import read_bag, read_topics
 from atg_fg.storage.scripted_trial import read_script
 from atg_fg.storage.trial_log import TrialLog
 from atg_fg.storage.uai import read_evidence, read_model
+from sim.bodies.robot_mapping import read_mapping
 from sim.bodies.urdf_reader import read_urdf
 from sim.noise_calibration import calibrate, read_counts
 from tests.torture.mutations import FAST, mutated
 from tests.torture.originals import originals
+from tests.torture.recorded import BAG_TOPICS, bag_in_sqlite
 
 #: What a file may take: seconds of processor time, and bytes beyond what the process had before.
 MAX_SECONDS = 1.0
@@ -245,6 +262,65 @@ def _learn_in_place(path: Path) -> None:
             memory.merge(memory.names[0], memory.names[1])
 
 
+def _convert(path: Path) -> None:
+    """Check a recording, learn from it, and write it in both forms: each must be read as what was written."""
+    recording, faults = check_recording(path)
+    if any(fault.fatal for fault in faults):
+        read_recording(path)
+        raise AssertionError("a fatal fault, and no error")
+    _written_again(recording, path)
+    if len(recording.trials) * len(recording.labels) ** len(recording.slots) <= _SHORT:
+        with_number = recording if recording.n_objects else replace(recording, n_objects=4)
+        memory = RobotMemory(with_number.assumptions())
+        recognise(with_number, memory, "bayes-filter", ModelParameters(), learn=True)
+
+
+def _written_again(recording: Recording, path: Path) -> None:
+    for suffix in (".csv", ".jsonl"):
+        again = path.with_name(f"again{suffix}")
+        write_recording(recording, again)
+        assert _said(read_recording(again)) == _said(recording), suffix
+
+
+def _said(recording: Recording) -> list[Any]:
+    """What a recording says, in whatever form: not to state a confidence is to state none of each."""
+    return [
+        trial._replace(
+            looks=tuple(
+                look._replace(confidences=look.confidences if any(look.confidences) else ()) for look in trial.looks
+            )
+        )
+        for trial in recording.trials
+    ]
+
+
+def _read_bag(path: Path) -> None:
+    _written_again(read_bag(path, BAG_TOPICS), path)
+
+
+def _read_sqlite_bag(content: str, path: Path) -> None:
+    """Read a bag of rosbag2 of which one file, whose suffix is ``content``, is damaged."""
+    folder = path.with_name("bag")
+    shutil.copytree(_sound_bag(), folder)
+    (there,) = folder.glob(f"*{content}")
+    path.replace(there)
+    try:
+        _read_bag(folder)
+    finally:
+        shutil.rmtree(folder)
+
+
+@cache
+def _sound_bag() -> Path:
+    folder = Path(tempfile.mkdtemp(prefix="bag-", dir=FAST))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return bag_in_sqlite(folder / "bag")
+
+
+def _look(path: Path) -> None:
+    TagDetector(Tags("DICT_5X5_50", 0.04)).detect(read_image(path))
+
+
 #: What is done with files of each kind.
 READERS: Final[dict[str, Callable[[Path], None]]] = {
     "memory": _use_memory,
@@ -267,6 +343,16 @@ READERS: Final[dict[str, Callable[[Path], None]]] = {
     "tags": lambda path: read_tags(path) and None,
     "calibration": lambda path: read_calibration(path) and None,
     "URDF": lambda path: read_urdf(path) and None,
+    "mapping": lambda path: read_mapping(path) and None,
+    "picture": _look,
+    "recorded table": _convert,
+    "recorded lines": _convert,
+    "recording spec": lambda path: read_spec(path) and None,
+    "bag topics": lambda path: read_topics(path) and None,
+    "MCAP bag": _read_bag,
+    "bag of ROS 1": _read_bag,
+    "SQLite bag": partial(_read_sqlite_bag, ".db3"),
+    "bag metadata": partial(_read_sqlite_bag, ".yaml"),
 }
 SUFFIXES: Final = {
     "compact memory": ".npz",
@@ -275,6 +361,10 @@ SUFFIXES: Final = {
     "trial record": ".jsonl",
     "preset": ".json",
     "URDF": ".urdf",
+    "mapping": ".toml",
+    "picture": ".png",
+    "MCAP bag": ".mcap",
+    "bag of ROS 1": ".bag",
 }
 
 

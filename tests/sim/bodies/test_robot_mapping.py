@@ -124,3 +124,14 @@ def test_a_link_of_a_hand_that_is_not_there_is_refused(tmp_path):
     urdf, mapping = mapping_of(tmp_path, told().replace("r2/left_arm/wrist/yaw_link", "claw"))
     with pytest.raises(InvalidInputError, match="it has no link claw"):
         fitted(read_urdf(urdf), mapping)
+
+
+@pytest.mark.parametrize("value", ["1" + "0" * 400, "inf", "true"])
+def test_a_number_that_no_machine_can_hold_is_refused(value, tmp_path):
+    with pytest.raises(InvalidInputError, match="expected a mapping"):
+        mapping_of(tmp_path, told(shoulders=f"[0, {value}, 0]"))
+
+
+def test_lists_in_lists_without_end_are_no_toml(tmp_path):
+    with pytest.raises(InvalidInputError, match="expected TOML"):
+        mapping_of(tmp_path, told(shoulders="[" * 3000))
