@@ -31,10 +31,17 @@ def make_picture_box(**options: Any) -> gymnasium.Env[Any, Any]:
 
 
 def make_robonaut_arcube(**options: Any) -> gymnasium.Env[Any, Any]:
-    """Return a ``sim.worlds.robonaut_world.RobonautARcubeWorld``; its module is imported only now."""
-    from sim.worlds.robonaut_world import RobonautARcubeWorld
+    """Return a ``sim.worlds.robonaut_arcube_world.RobonautARcubeWorld``; its module is imported only now."""
+    from sim.worlds.robonaut_arcube_world import RobonautARcubeWorld
 
     return RobonautARcubeWorld(**options)
+
+
+def make_robonaut_picture_box(**options: Any) -> gymnasium.Env[Any, Any]:
+    """Return a ``sim.worlds.robonaut_picture_box_world.RobonautPictureBoxWorld``; its module is imported only now."""
+    from sim.worlds.robonaut_picture_box_world import RobonautPictureBoxWorld
+
+    return RobonautPictureBoxWorld(**options)
 
 
 def make_robonaut_table(**options: Any) -> gymnasium.Env[Any, Any]:
@@ -51,6 +58,9 @@ gymnasium.register(id="sim/PictureBox-v0", entry_point="sim:make_picture_box")
 
 
 gymnasium.register(id="sim/RobonautARcube-v0", entry_point="sim:make_robonaut_arcube")
+
+
+gymnasium.register(id="sim/RobonautPictureBox-v0", entry_point="sim:make_robonaut_picture_box")
 
 
 gymnasium.register(id="sim/RobonautTable-v0", entry_point="sim:make_robonaut_table")

@@ -13,7 +13,7 @@ from atg_fg.core.patterns import FloatArray
 from atg_fg.worlds.arcube import ACTION_SOURCES
 from sim.vision.camera import Camera
 from sim.worlds.film import observed
-from sim.worlds.robonaut_world import RobonautARcubeWorld
+from sim.worlds.robonaut_arcube_world import RobonautARcubeWorld
 from sim.worlds.scene import Scene
 from sim.worlds.stations_world import RobonautTableWorld
 

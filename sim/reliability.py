@@ -20,7 +20,7 @@ from atg_fg.worlds.arcube import ACTION_SOURCES
 from sim.bodies.prepared_robot import PreparedRobot
 from sim.manipulation.preparation import prepared
 from sim.worlds.domain_randomization import condition_named
-from sim.worlds.robonaut_world import RobonautARcubeWorld
+from sim.worlds.robonaut_arcube_world import RobonautARcubeWorld
 from sim.worlds.stations_world import RobonautTableWorld
 
 #: Actions between two new cubes, as in a trial.

@@ -157,6 +157,15 @@ def nearest_orientation(rotation: FloatArray) -> tuple[int, float]:
     return nearest, float(np.arccos(np.clip((traces[nearest] - 1) / 2, -1, 1)))
 
 
+def face_corners(face: int, rotation: FloatArray, centre: FloatArray) -> FloatArray:
+    """Return the corners of a face, clockwise from the upper left one of its picture, shape [4, 3], m."""
+    normal, up = FACE_NORMALS[face], FACE_UPS[face]
+    right = np.cross(up, normal)
+    half = CUBE_SIZE / 2
+    own = half * (normal + np.array([up - right, up + right, right - up, -up - right]))
+    return np.asarray(own @ rotation.T + centre)
+
+
 def _write_face(face: int, folder: Path) -> str:
     """Write one face as a textured square in Wavefront OBJ and return its path."""
     normal, up = FACE_NORMALS[face], FACE_UPS[face]

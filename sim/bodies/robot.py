@@ -23,7 +23,8 @@ _NEIGHBOURS: Final = 3
 
 #: What the eye looks at: a little before the middle of the cube's place, and below.
 _GAZE: Final = CUBE_CENTRE - [0.02, 0.0, 0.02]
-_JOINT_DAMPING: Final = 0.1  # N·m·s/rad
+#: Of every joint.
+JOINT_DAMPING: Final = 0.1  # N·m·s/rad
 
 
 class RobotBody:
@@ -57,7 +58,7 @@ class RobotBody:
         self.hands = tuple(self.joints[arm[-1]] for arm in robot.arm_joints)
         for joint in range(n_joints):
             pybullet.changeDynamics(
-                self.body, joint, linearDamping=0, angularDamping=0, jointDamping=_JOINT_DAMPING, physicsClientId=client
+                self.body, joint, linearDamping=0, angularDamping=0, jointDamping=JOINT_DAMPING, physicsClientId=client
             )
         self._let_neighbours_touch()
         self.let_touch(robot.overlapping)
@@ -99,17 +100,27 @@ class RobotBody:
         )
 
     def gravity_torques(self, angles: FloatArray) -> FloatArray:
-        """Return the torques that hold the arms still at joint angles, both of shape [2, 7] (rad, N·m).
+        """Return the torques that hold the arms still at joint angles, both of shape [2, 7] (rad, N·m)."""
+        return self.torques_of(angles, np.zeros_like(angles), np.zeros_like(angles))
+
+    def torques_of(self, angles: FloatArray, velocities: FloatArray, accelerations: FloatArray) -> FloatArray:
+        """Return the torques of a motion of the arms in which the hands touch nothing, shape [2, 7], N·m.
 
         The rest of the body is taken as it stands.
+
+        Args:
+            angles: Shape [2, 7], rad.
+            velocities: Shape [2, 7], rad/s.
+            accelerations: Shape [2, 7], rad/s².
         """
         states = pybullet.getJointStates(self.body, self._movable, physicsClientId=self.client)
         posture = dict(zip(self._movable, (state[0] for state in states), strict=True))
-        posture.update(zip(self.arm_joints, angles.ravel().tolist(), strict=True))
-        still = [0.0] * len(posture)
-        torques = pybullet.calculateInverseDynamics(
-            self.body, list(posture.values()), still, still, physicsClientId=self.client
-        )
+        still = dict.fromkeys(self._movable, 0.0)
+        moving = [
+            list({**rest, **dict(zip(self.arm_joints, arms.ravel().tolist(), strict=True))}.values())
+            for rest, arms in ((posture, angles), (still, velocities), (still, accelerations))
+        ]
+        torques = pybullet.calculateInverseDynamics(self.body, *moving, physicsClientId=self.client)
         by_joint = dict(zip(self._movable, torques, strict=True))
         return np.array([by_joint[joint] for joint in self.arm_joints]).reshape(2, -1)
 

@@ -44,6 +44,7 @@ class Manipulator:
 
     Attributes:
         squarings: How often the cube had to be squared up.
+        phase: Name of the phase that a plan is in, or was in last.
     """
 
     def __init__(
@@ -59,6 +60,7 @@ class Manipulator:
         self.look = look
         self.on_phase = on_phase
         self.squarings = 0
+        self.phase = ""
         self._rolled = self._rolling = np.zeros((2, 3))
         self._held: FloatArray | None = None
 
@@ -86,6 +88,7 @@ class Manipulator:
     def _follow(self, waypoints: Iterable[Waypoint]) -> None:
         """Go through way-points, one phase after the other."""
         for phase, group in groupby(waypoints, key=lambda waypoint: waypoint.name):
+            self.phase = phase
             if self.on_phase is not None:
                 self.on_phase(phase)
             targets: list[JointTarget] = []

@@ -81,12 +81,18 @@ class ArmController:
     Args:
         robot: The robot.
         advance: Takes the simulation one step on.
+
+    Attributes:
+        exertion: How near the joints came to their limits.
+        on_motion: Called after each part of a motion with the angles (rad), speeds (rad/s) and torques (N·m) of its
+            steps, each of shape [steps, 2, 7].
     """
 
     def __init__(self, robot: RobotBody, advance: Callable[[], None]) -> None:
         self.robot = robot
         self._advance = advance
         self.exertion = Exertion()
+        self.on_motion: Callable[[FloatArray, FloatArray, FloatArray], None] | None = None
         self._springs, self._dampers = np.tile(_STIFFNESS, 2).tolist(), np.tile(_DAMPING, 2).tolist()
         self.reference, _ = robot.state()
         self.feedforward = robot.gravity_torques(self.reference)
@@ -157,7 +163,7 @@ class ArmController:
         robot, advance = self.robot, self._advance
         most = robot.effort.ravel()
         least = float(most.min())
-        velocities, torques = array("d"), array("d")
+        angles, velocities, torques = array("d"), array("d"), array("d")
         for step in range(steps):
             if step % _STEPS_PER_REFERENCE == 0 and step // _STEPS_PER_REFERENCE < len(rows):
                 command = rows[step // _STEPS_PER_REFERENCE]
@@ -169,10 +175,14 @@ class ArmController:
             weak = max(wanted) > least or min(wanted) < -least
             robot.drive(np.clip(wanted, -most, most).tolist() if weak else wanted)
             advance()
+            angles.extend([state[0] for state in states])
             velocities.extend([state[1] for state in states])
             torques.extend(wanted)
         if steps:
             self.exertion.add(np.abs(velocities).reshape(steps, -1), np.abs(torques).reshape(steps, -1), robot)
+            if self.on_motion is not None:
+                applied = np.clip(np.reshape(torques, (steps, *robot.effort.shape)), -robot.effort, robot.effort)
+                self.on_motion(np.reshape(angles, applied.shape), np.reshape(velocities, applied.shape), applied)
 
 
 def _cubic(way: FloatArray, first: FloatArray, last: FloatArray) -> tuple[FloatArray, FloatArray]:

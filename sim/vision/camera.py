@@ -28,6 +28,11 @@ class Light:
     ambient: float = 0.6
     diffuse: float = 0.4
 
+    @property
+    def on_top(self) -> float:
+        """How light what faces upwards is, as a share of its colour."""
+        return self.ambient + self.diffuse * self.direction[2] / float(np.linalg.norm(self.direction))
+
 
 @dataclass(frozen=True)
 class Camera:
@@ -64,6 +69,18 @@ class Camera:
         right = right / np.linalg.norm(right)
         return np.column_stack([right, np.cross(forward, right), forward])
 
+    @cached_property
+    def rays(self) -> FloatArray:
+        """The direction that each pixel looks in, in OpenCV's camera frame, 1 m deep, shape [height, width, 3]."""
+        (focal, _, across), (_, _, down), _ = self.intrinsics
+        rows, columns = np.indices(self.image_size[::-1])
+        return np.stack([(columns - across) / focal, (rows - down) / focal, np.ones(rows.shape)], axis=-1)
+
+    def project(self, points: FloatArray) -> FloatArray:
+        """Return where points of the world, shape [n, 3], m, are in the image, shape [n, 2], pixels."""
+        pixels = (points - np.array(self.eye)) @ self.rotation @ self.intrinsics.T
+        return np.asarray(pixels[:, :2] / pixels[:, 2:])
+
     def moved(self, by: FloatArray) -> Camera:
         """Return the camera moved by a vector of shape [3], m."""
         eye, target = np.add(self.eye, by).tolist(), np.add(self.target, by).tolist()
@@ -71,10 +88,19 @@ class Camera:
 
     def render(self, client: int, light: Light, *, shadow: bool = False) -> NDArray[np.uint8]:
         """Return what the camera sees, RGB, shape [height, width, 3]; shadows are for people, and slow."""
+        return self.render_with_depth(client, light, shadow=shadow)[0]
+
+    def render_with_depth(
+        self, client: int, light: Light, *, shadow: bool = False
+    ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+        """Return what the camera sees, RGB, shape [height, width, 3], and how deep it is, shape [height, width], m.
+
+        Where there is nothing, the depth is zero.
+        """
         width, height = self.image_size
         view = pybullet.computeViewMatrix(self.eye, self.target, self._up)
         projection = pybullet.computeProjectionMatrixFOV(self.field_of_view, width / height, self.near, _FAR)
-        _, _, pixels, _, _ = pybullet.getCameraImage(
+        _, _, pixels, buffer, _ = pybullet.getCameraImage(
             width,
             height,
             view,
@@ -89,4 +115,7 @@ class Camera:
             physicsClientId=client,
         )
         # Some builds of PyBullet return a flat tuple.
-        return np.reshape(np.asarray(pixels, dtype=np.uint8), (height, width, 4))[:, :, :3].copy()
+        frame = np.reshape(np.asarray(pixels, dtype=np.uint8), (height, width, 4))[:, :, :3].copy()
+        share = np.reshape(np.asarray(buffer, dtype=np.float32), (height, width))
+        depth = np.where(share < 1, _FAR * self.near / (_FAR - (_FAR - self.near) * share), 0.0)
+        return frame, depth.astype(np.float32)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from atg_fg.core.errors import InvalidInputError
 from sim.vision.camera import Camera, Light
+from sim.vision.depth_noise import noisy_depth
 
 
 @dataclass(frozen=True)
@@ -20,6 +21,7 @@ class Imaging:
         light_jitter: How much the light may change at each look, 0 (not at all) to 1.
         image_noise: Standard deviation of noise on each grey level (0 to 255).
         blur: Standard deviation of a Gaussian blur, pixels.
+        depth_noise: Noise of depth as a multiple of what is published of such cameras (``sim.vision.depth_noise``).
 
     Raises:
         InvalidInputError: A value below zero or not finite.
@@ -28,14 +30,29 @@ class Imaging:
     light_jitter: float = 0.0
     image_noise: float = 0.0
     blur: float = 0.0
+    depth_noise: float = 1.0
 
     def __post_init__(self) -> None:
-        for name in ("light_jitter", "image_noise", "blur"):
+        for name in ("light_jitter", "image_noise", "blur", "depth_noise"):
             at_least_zero(name, getattr(self, name))
 
     def frame(self, camera: Camera, client: int, rng: np.random.Generator) -> NDArray[np.uint8]:
         """Return what the camera sees, RGB, shape [height, width, 3]. Draws nothing for what is zero."""
-        frame = camera.render(client, self._light(rng))
+        return self._developed(camera.render(client, self._light(rng)), rng)
+
+    def frame_with_depth(
+        self, camera: Camera, client: int, rng: np.random.Generator
+    ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+        """Return what a camera of colour and depth sees: RGB, shape [height, width, 3], and depth, [height, width], m.
+
+        Where nothing is measured, the depth is zero.
+        """
+        frame, depth = camera.render_with_depth(client, self._light(rng))
+        frame = self._developed(frame, rng)
+        return frame, noisy_depth(depth, camera.intrinsics[0, 0], self.depth_noise, rng)
+
+    def _developed(self, frame: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint8]:
+        """Return a frame with blur and noise."""
         if self.blur:
             frame = np.asarray(cv2.GaussianBlur(frame, (0, 0), self.blur), dtype=np.uint8)
         if self.image_noise:

@@ -13,7 +13,7 @@ from atg_fg.core.patterns import FloatArray
 from atg_fg.senses.face_features import check_image, rectified
 from atg_fg.senses.tag_drawing import SLOT_COLOURS
 from atg_fg.worlds.arcube import FACE_NORMALS, FRONT, TOP
-from sim.bodies.cube import CUBE_CENTRE, CUBE_SIZE, FACE_UPS
+from sim.bodies.cube import CUBE_CENTRE, CUBE_SIZE, face_corners
 from sim.vision.box_pose import find_box, lightness, turned
 from sim.vision.camera import Camera, Light
 from sim.vision.image_noise import at_least_zero
@@ -55,19 +55,13 @@ class PictureBoxCamera:
         #: The table without a box in usual light, RGB, shape [height, width, 3].
         self.empty = self._draw_table()
 
-    def project(self, points: FloatArray) -> FloatArray:
-        """Return where points of the world, shape [n, 3], m, are in the image, shape [n, 2], pixels."""
-        seen = (points - np.array(self.camera.eye)) @ self.camera.rotation
-        pixels = seen @ self.camera.intrinsics.T
-        return np.asarray(pixels[:, :2] / pixels[:, 2:])
-
     def _draw_table(self) -> NDArray[np.float32]:
         width, height = self.camera.image_size
         drawn = np.empty((height, width, 3), dtype=np.float32)
         drawn[:] = _FLOOR
         z = CUBE_CENTRE[2] - CUBE_SIZE / 2
         table = np.array([[0.18, -0.4, z], [0.82, -0.4, z], [0.82, 0.4, z], [0.18, 0.4, z]])
-        cv2.fillConvexPoly(drawn, np.round(self.project(table)).astype(np.int32), _TABLE, cv2.LINE_AA)
+        cv2.fillConvexPoly(drawn, np.round(self.camera.project(table)).astype(np.int32), _TABLE, cv2.LINE_AA)
         return drawn
 
     def frame(
@@ -92,7 +86,7 @@ class PictureBoxCamera:
             if normal @ (np.array(self.camera.eye) - centre - normal * CUBE_SIZE / 2) <= 0:
                 continue
             shade = lightness * (Light().ambient + Light().diffuse * max(0.0, float(normal @ lamp)))
-            corners = self.project(_corners(face, turn @ rotation, centre)).astype(np.float32)
+            corners = self.camera.project(face_corners(face, turn @ rotation, centre)).astype(np.float32)
             picture = np.asarray(pictures[face] * np.float32(shade))
             side = picture.shape[0]
             square = np.array([[0, 0], [side, 0], [side, side], [0, side]], dtype=np.float32)
@@ -126,10 +120,10 @@ class PictureBoxCamera:
             InvalidInputError: A frame of another size or type.
         """
         check_image(frame, "frame", self.camera.image_size)
-        pose = find_box(frame, self.empty, self.project)
+        pose = find_box(frame, self.empty, self.camera.project)
         x, y, yaw = np.zeros(3) if pose is None else pose
         centre = np.add(CUBE_CENTRE, (x, y, 0.0))
-        return [self.project(_corners(place, turned(float(yaw)), centre)) for place in (FRONT, TOP)]
+        return [self.camera.project(face_corners(place, turned(float(yaw)), centre)) for place in (FRONT, TOP)]
 
     def crops(self, frame: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Return what is in front and on top, as if seen from straight ahead, shape [2, side, side, 3].
@@ -142,12 +136,3 @@ class PictureBoxCamera:
         faces, light = self.faces(frame), lightness(frame, self.empty)
         usual = np.clip(np.round(frame / np.float32(light)), 0, 255).astype(np.uint8)
         return np.array([rectified(usual, face) for face in faces])
-
-
-def _corners(face: int, rotation: FloatArray, centre: FloatArray) -> FloatArray:
-    """Return the corners of a face, clockwise from the upper left one of its picture, shape [4, 3], m."""
-    normal, up = FACE_NORMALS[face], FACE_UPS[face]
-    right = np.cross(up, normal)
-    half = CUBE_SIZE / 2
-    own = half * (normal + np.array([up - right, up + right, right - up, -up - right]))
-    return np.asarray(own @ rotation.T + centre)

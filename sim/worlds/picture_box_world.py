@@ -49,10 +49,78 @@ _CALIBRATION_BOXES, _DIMENSIONS = 24, 24
 _WITHIN: Final = 3.0
 
 
-class PictureBoxWorld(FiniteStateWorld):
-    """One box that three actions turn: flip, left, right; what is in front and on top is looked at.
+class BoxesWithPictures(FiniteStateWorld):
+    """Boxes that three actions turn: flip, left, right; of what is in front and on top the features are told.
 
-    An observation has the features of both faces (``appearance``), and which of them were ``seen``.
+    An observation has the features of both faces (``appearance``), and which of them were ``seen``. A subclass turns
+    boxes and has a camera: what is told is of ``crops`` and ``seen`` as it left them.
+
+    Args:
+        n_objects: How many boxes there are.
+        objects_seed: Seed that they and their pictures are drawn by.
+        look_alikes: Share of the boxes that differ from another one in a single face.
+        features: ``"colours-and-gradients"``, or ``module:function`` of a user's own.
+        noise: ``slip`` and ``missing`` of ``FiniteStateWorld``.
+
+    Attributes:
+        boxes: The boxes, and the pictures on them.
+        features: Makes features of a crop.
+        crops: The faces in front and on top that were cut out of the last frame, RGB, shape [2, side, side, 3].
+        seen: Which of them were found, shape [2].
+    """
+
+    state_name = "orientation"
+
+    def __init__(
+        self,
+        n_objects: int = 100,
+        objects_seed: int = 0,
+        *,
+        look_alikes: float = 0.1,
+        features: str = DEFAULT_FEATURES,
+        render_mode: str | None = None,
+        **noise: float,
+    ) -> None:
+        self.boxes = make_picture_boxes(n_objects, objects_seed, look_alikes=look_alikes)
+        n_actions, n_slots = len(ACTION_SOURCES), len(_SLOTS)
+        super().__init__(n_objects, n_actions, n_slots, MOST_CLASSES, render_mode=render_mode, **noise)
+        self.features = face_features(features)
+        self.alphabet = PatternAlphabet(_SLOTS, MOST_CLASSES, exclusive=False)
+        self._features_name = features
+        blank = np.zeros((CROP, CROP, 3), dtype=np.uint8)
+        self.observation_space: Any = appearance_space(n_slots, len(self.features(blank)))
+        self.crops: NDArray[np.uint8] = np.zeros((n_slots, CROP, CROP, 3), dtype=np.uint8)
+        self.seen: NDArray[np.int8] = np.ones(n_slots, dtype=np.int8)
+
+    @cached_property
+    def sense(self) -> AppearanceSense:
+        """One that reads these observations and knows no class yet; it takes seconds to calibrate the first one."""
+        return AppearanceSense(calibrated_space(self._features_name), self.alphabet, within=_WITHIN)
+
+    @property
+    def assumptions(self) -> Assumptions:
+        """What a robot in this world takes for granted."""
+        return Assumptions(len(self.boxes.faces), len(ORIENTATIONS), tuple(ACTION_SOURCES), self.alphabet)
+
+    def _n_states(self) -> int:
+        return len(ORIENTATIONS)
+
+    def _successor(self, action: int) -> int:
+        return SUCCESSORS[self.state][action]
+
+    def _pattern(self) -> tuple[int, ...]:
+        return shown_pattern(self.boxes.faces[self.object], self.state)
+
+    def _look(self) -> dict[str, NDArray[Any]]:
+        appearance = np.array([self.features(crop) for crop in self.crops], dtype=np.float64)
+        seen = self.seen.copy()
+        if self.missing:
+            seen[self.np_random.random(len(_SLOTS)) < self.missing] = 0
+        return {APPEARANCE: appearance * seen[:, None], SEEN: seen}
+
+
+class PictureBoxWorld(BoxesWithPictures):
+    """One box before a camera that each look finds a little off its place, in another light.
 
     Args:
         n_objects: How many boxes there are.
@@ -79,7 +147,6 @@ class PictureBoxWorld(FiniteStateWorld):
     """
 
     metadata: dict[str, Any] = {"render_modes": ["rgb_array", "detections"], "render_fps": 1}  # noqa: RUF012
-    state_name = "orientation"
 
     def __init__(
         self,
@@ -98,13 +165,10 @@ class PictureBoxWorld(FiniteStateWorld):
         blur: float = 0.6,
         render_mode: str | None = None,
     ) -> None:
-        self.boxes = make_picture_boxes(n_objects, objects_seed, look_alikes=look_alikes)
-        n_actions, n_slots = len(ACTION_SOURCES), len(_SLOTS)
-        noise = {"slip": slip, "missing": missing}
-        super().__init__(n_objects, n_actions, n_slots, MOST_CLASSES, render_mode=render_mode, **noise)
+        boxes: dict[str, Any] = {"look_alikes": look_alikes, "features": features, "slip": slip, "missing": missing}
+        super().__init__(n_objects, objects_seed, render_mode=render_mode, **boxes)
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise unknown_name("render mode", render_mode, self.metadata["render_modes"])
-        self.features = face_features(features)
         self.camera = PictureBoxCamera(
             Camera(image_size=checked_size(image_size)),
             position_jitter=position_jitter,
@@ -113,23 +177,8 @@ class PictureBoxWorld(FiniteStateWorld):
             image_noise=image_noise,
             blur=blur,
         )
-        self.alphabet = PatternAlphabet(_SLOTS, MOST_CLASSES, exclusive=False)
-        self._features_name = features
-        blank = np.zeros((CROP, CROP, 3), dtype=np.uint8)
-        self.observation_space: Any = appearance_space(n_slots, len(self.features(blank)))
         width, height = self.camera.camera.image_size
         self.frame: NDArray[np.uint8] = np.zeros((height, width, 3), dtype=np.uint8)
-        self.crops: NDArray[np.uint8] = np.zeros((n_slots, CROP, CROP, 3), dtype=np.uint8)
-
-    @cached_property
-    def sense(self) -> AppearanceSense:
-        """One that reads these observations and knows no class yet; it takes seconds to calibrate the first one."""
-        return AppearanceSense(calibrated_space(self._features_name), self.alphabet, within=_WITHIN)
-
-    @property
-    def assumptions(self) -> Assumptions:
-        """What a robot in this world takes for granted."""
-        return Assumptions(len(self.boxes.faces), len(ORIENTATIONS), tuple(ACTION_SOURCES), self.alphabet)
 
     def render(self) -> NDArray[np.uint8] | None:
         """Return the last camera frame, RGB, shape [height, width, 3]; ``None`` without a render mode."""
@@ -139,31 +188,24 @@ class PictureBoxWorld(FiniteStateWorld):
 
     def camera_picture(self) -> NDArray[np.uint8]:
         """Return the last camera frame with what was cut out of it beside it, front below top, whatever the mode."""
-        side = self.frame.shape[0] // len(_SLOTS)
-        large = [cv2.resize(crop, (side, side), interpolation=cv2.INTER_NEAREST) for crop in self.crops[::-1]]
-        column = np.vstack(large)
-        column = np.pad(column, ((0, self.frame.shape[0] - len(column)), (0, 0), (0, 0)), constant_values=255)
-        return np.hstack([self.camera.outlined(self.frame), np.asarray(column, dtype=np.uint8)])
-
-    def _n_states(self) -> int:
-        return len(ORIENTATIONS)
-
-    def _successor(self, action: int) -> int:
-        return SUCCESSORS[self.state][action]
-
-    def _pattern(self) -> tuple[int, ...]:
-        return shown_pattern(self.boxes.faces[self.object], self.state)
+        return beside(self.camera.outlined(self.frame), self.crops)
 
     def _look(self) -> dict[str, NDArray[Any]]:
         """Take a frame, and return the features of what is in front and on top of it."""
         pictures = [self.boxes.pictures[picture] for picture in self.boxes.faces[self.object]]
         self.frame = self.camera.frame(pictures, rotation_of(self.state), self.np_random)
         self.crops = self.camera.crops(self.frame)
-        appearance = np.array([self.features(crop) for crop in self.crops], dtype=np.float64)
-        seen = np.ones(len(_SLOTS), dtype=np.int8)
-        if self.missing:
-            seen[self.np_random.random(len(_SLOTS)) < self.missing] = 0
-        return {APPEARANCE: appearance * seen[:, None], SEEN: seen}
+        return super()._look()
+
+
+def beside(picture: NDArray[np.uint8], crops: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return a picture with what was cut out of it, shape [2, side, side, 3], to its right: front below top."""
+    height = picture.shape[0]
+    side = height // len(crops)
+    large = [cv2.resize(crop, (side, side), interpolation=cv2.INTER_NEAREST) for crop in crops[::-1]]
+    column = np.vstack(large)
+    column = np.pad(column, ((0, height - len(column)), (0, 0), (0, 0)), constant_values=255)
+    return np.hstack([picture, np.asarray(column, dtype=np.uint8)])
 
 
 @lru_cache(maxsize=4)

@@ -5,6 +5,7 @@ Rerun is imported by what is called here, not with the module; who has a recordi
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
@@ -33,8 +34,8 @@ def log_world(recording: Any) -> None:
     recording.log("world", import_rerun().ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
 
 
-def log_cube(recording: Any, path: str, cube: Cube) -> None:
-    """Log a cube's six faces with their tags, about its centre."""
+def log_cube(recording: Any, path: str, cube: Cube, pictures: Sequence[NDArray[np.uint8]] | None = None) -> None:
+    """Log a cube's six faces with their tags, or the pictures of their symbols, about its centre."""
     rerun = import_rerun()
     for face, symbol in enumerate(cube):
         normal, up = FACE_NORMALS[face], FACE_UPS[face]
@@ -46,7 +47,7 @@ def log_cube(recording: Any, path: str, cube: Cube) -> None:
             vertex_normals=[normal] * 4,
             # A texture's rows go down.
             vertex_texcoords=[((1 + x) / 2, (1 - y) / 2) for x, y in _CORNERS],
-            albedo_texture=face_image(symbol),
+            albedo_texture=face_image(symbol) if pictures is None else pictures[symbol],
         )
         recording.log(f"{path}/face_{face}", mesh)
 

@@ -1,30 +1,28 @@
-"""The robot turns the cube: contact physics makes the next aspect, the head's camera supplies the evidence."""
+"""The robot turns a cube: contact physics makes the next aspect, the head's camera sees it, and where the cube is."""
 
 from __future__ import annotations
 
 import copy
+from abc import abstractmethod
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, cast
+from typing import Any, ClassVar, Final, cast
 
 import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
 from atg_fg.core.errors import InvalidInputError, unknown_name
-from atg_fg.core.patterns import IntArray
-from atg_fg.senses.tags import DetectedTag
-from atg_fg.worlds.arcube import ACTION_SOURCES, SUCCESSORS, Cube, rotation_of, shown_pattern
-from atg_fg.worlds.arcube_world import ARcubeWorld
+from atg_fg.worlds.arcube import ACTION_SOURCES, SUCCESSORS, Cube, rotation_of
+from atg_fg.worlds.base import FiniteStateWorld
 from sim.bodies.cube import CUBE_CENTRE, nearest_orientation
 from sim.bodies.prepared_robot import PreparedRobot
 from sim.manipulation.execution import Manipulator, OutOfReachError
 from sim.manipulation.impedance_control import ArmController
 from sim.manipulation.preparation import prepared
 from sim.vision.camera import Camera
-from sim.vision.cube_pose import CubePose, cube_pose
-from sim.vision.tag_detection import detect_markers, detected_symbols, draw_detections
+from sim.vision.cube_pose import CubePose
 from sim.worlds.domain_randomization import Circumstances, condition_named
 from sim.worlds.film import OBSERVER, Film, observed
 from sim.worlds.rendered_world import checked_size
@@ -42,9 +40,6 @@ RIGHT_DISTANCE: Final = 0.06
 LARGEST_OFFSET: Final = 0.03
 
 
-_FIELD_OF_VIEW: Final = 40.0  # degrees, vertical
-
-
 _NEAR: Final = 0.25  # m from the eye: beyond the visor, before the hands
 _SETTLING: Final = 0.25  # s
 
@@ -54,7 +49,7 @@ _ACTIONS: Final = tuple(ACTION_SOURCES)
 
 @dataclass(frozen=True, eq=False)
 class Snapshot:
-    """A world between two actions, as ``RobonautARcubeWorld.save`` keeps it.
+    """A world between two actions, as ``RobonautWorld.save`` keeps it.
 
     Attributes:
         scene: The trial's scene; no other can be set back to this.
@@ -67,27 +62,27 @@ class Snapshot:
     world: dict[str, Any]
 
 
-class RobonautARcubeWorld(ARcubeWorld):
-    """A Robonaut-like robot that flips and turns an ARcube on a table, by friction alone.
+class RobonautWorld(FiniteStateWorld):
+    """A Robonaut-like robot that flips and turns a cube on a table, by friction alone.
 
-    The robot sees the cube through the camera in its head only: where to take hold and what is shown come from the
-    tags in the image. ``info`` tells the truth, for scoring. A cube that fell or cannot be reached any more ends the
-    episode: ``terminated`` is true and ``info["lost"]`` says so.
+    The robot sees the cube through the camera in its head only. ``info`` tells the truth, for scoring. A cube that fell
+    or cannot be reached any more ends the episode: ``terminated`` is true and ``info["lost"]`` says so.
+
+    A subclass is a world of cubes as well, and says what is on their faces and what the robot makes of what it sees.
 
     ``reset(options=…)`` takes ``object`` and ``orientation``, and ``position``: (x, y) of the cube's centre, m.
 
     Args:
-        cubes: As for ``ARcubeWorld``.
+        objects: As for the world of cubes, like ``options``.
         condition: Name of a condition in ``sim.worlds.domain_randomization``.
         urdf: A user's own description of the robot, or one made ready, instead of the shell.
         image_size: (width, height) of the head camera's frame, pixels.
         render_mode: ``"rgb_array"``, seen by an observer; ``"head"``, the last frame of the head's camera;
-            ``"detections"``, the same with the detected tags outlined; ``"rgb_array_list"``, a film of all that
+            ``"detections"``, the same with what was found in it outlined; ``"rgb_array_list"``, a film of all that
             happened since it was last asked for, seen by an observer, with what the head sees in a corner.
 
     Attributes:
         frame: The last frame of the head's camera, RGB, shape [height, width, 3].
-        markers: What was detected in it.
         circumstances: What was drawn for this trial.
         camera: The head's, in the robot's frame.
     """
@@ -96,35 +91,55 @@ class RobonautARcubeWorld(ARcubeWorld):
         "render_modes": ["rgb_array", "head", "detections", "rgb_array_list"],
         "render_fps": 10,
     }
+    field_of_view: ClassVar[float] = 40.0  # of the camera, vertical, degrees
 
     def __init__(
         self,
-        cubes: Sequence[Cube] | None = None,
-        *,
+        *objects: Any,
         condition: str = "nominal",
         urdf: str | Path | PreparedRobot | None = None,
         image_size: tuple[int, int] = (320, 240),
         render_mode: str | None = None,
+        **options: Any,
     ) -> None:
-        super().__init__(cubes, render_mode=render_mode)
+        super().__init__(*objects, render_mode=render_mode, **options)
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise unknown_name("render mode", render_mode, self.metadata["render_modes"])
         self.condition = condition_named(condition)
         self._image_size = checked_size(image_size)
         self.circumstances = Circumstances()
         self._robot = prepared(Path(urdf)) if isinstance(urdf, (str, Path)) else urdf
-        self.object, self.orientation, self._position = 0, 0, CUBE_CENTRE
+        self.object, self.state, self._position = 0, 0, CUBE_CENTRE
         self._build()
         self.camera = self._head_camera()
         self.frame: NDArray[np.uint8] = np.zeros((*self._image_size[::-1], 3), dtype=np.uint8)
-        self.markers: list[DetectedTag] = []
         self.lost = False
         self._seen_at = -1
         self._outcome: dict[str, Any] = {}
         self._film = Film(self.metadata["render_fps"]) if render_mode == "rgb_array_list" else None
         self._viewer: SceneViewer | None = None
 
-    def step(self, action: np.int64) -> tuple[IntArray, float, bool, bool, dict[str, Any]]:
+    @abstractmethod
+    def camera_picture(self) -> NDArray[np.uint8]:
+        """Return the last frame of the head's camera with what was found in it, whatever the render mode."""
+
+    @abstractmethod
+    def _symbols(self) -> Cube:
+        """Return the symbol on each face of the cube that is presented."""
+
+    def _pictures(self) -> Sequence[NDArray[np.uint8]] | None:
+        """Return what each symbol looks like, RGB; ``None`` if they are tags."""
+        return None
+
+    @abstractmethod
+    def _perceive(self) -> None:
+        """Take a frame with the head's camera, and find the cube in it."""
+
+    @abstractmethod
+    def _found_cube(self) -> CubePose | None:
+        """Return where the cube was found in the last frame, ``None`` if it was not."""
+
+    def step(self, action: np.int64) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Let the robot act and look.
 
         Raises:
@@ -133,18 +148,18 @@ class RobonautARcubeWorld(ARcubeWorld):
         self._check_action(action)
         if self.lost:
             raise InvalidInputError("step: the cube is lost; expected a reset first")
-        before, begun, squarings = self.orientation, self.scene.seconds, self.manipulator.squarings
+        before, begun, squarings = self.state, self.scene.seconds, self.manipulator.squarings
         self.scene.peak_force = 0.0
         reachable = self._try(_ACTIONS[int(action)])
         self.lost = not reachable or self.scene.has_lost_the_cube()
-        self.orientation, _ = nearest_orientation(self.scene.cube_pose()[1])
+        self.state, _ = nearest_orientation(self.scene.cube_pose()[1])
         self._outcome = {
             **self._score(SUCCESSORS[before][int(action)]),
             "peak_force": self.scene.peak_force,
             "squarings": self.manipulator.squarings - squarings,
             "simulated_seconds": self.scene.seconds - begun,
         }
-        return self._look(), 0.0, self.lost, False, self._truth(slipped=self.orientation == before)
+        return self._look(), 0.0, self.lost, False, self._truth(slipped=self.state == before)
 
     def render(self) -> Any:
         """Return a picture, RGB, shape [height, width, 3], or a film as a list of them; ``None`` without a mode."""
@@ -155,10 +170,6 @@ class RobonautARcubeWorld(ARcubeWorld):
         if self.render_mode == "detections":
             return self.camera_picture()
         return None if self._film is None else self._film.take()
-
-    def camera_picture(self) -> NDArray[np.uint8]:
-        """Return the last frame of the head's camera with the detected tags outlined, whatever the render mode."""
-        return draw_detections(self.frame, self.markers)
 
     def show_in(self, recording: Any) -> None:
         """Show the scene of each trial from the next reset on in a Rerun recording (``sim.worlds.scene_viewer``)."""
@@ -185,23 +196,22 @@ class RobonautARcubeWorld(ARcubeWorld):
 
     def _state(self) -> dict[str, Any]:
         return {
-            "orientation": self.orientation,
+            "state": self.state,
             "lost": self.lost,
             "steps": self.scene.steps,
             "seen_at": self._seen_at,
             "reference": self.controller.reference,
             "feedforward": self.controller.feedforward,
             "frame": self.frame,
-            "markers": self.markers,
             "outcome": self._outcome,
             "generator": self.np_random,
         }
 
     def _set_state(self, kept: dict[str, Any]) -> None:
-        self.orientation, self.lost = kept["orientation"], kept["lost"]
+        self.state, self.lost = kept["state"], kept["lost"]
         self.scene.steps, self._seen_at = kept["steps"], kept["seen_at"]
         self.controller.reference, self.controller.feedforward = kept["reference"], kept["feedforward"]
-        self.frame, self.markers, self._outcome = kept["frame"], kept["markers"], kept["outcome"]
+        self.frame, self._outcome = kept["frame"], kept["outcome"]
         self.np_random = kept["generator"]
 
     def _check_action(self, action: np.int64) -> None:
@@ -224,17 +234,17 @@ class RobonautARcubeWorld(ARcubeWorld):
         if self._film is not None:
             self._film.begin(self.scene, self.camera_picture, self._observer)
         if self._viewer is not None:
-            self._viewer.begin(self.scene, [cube.tags for cube in self._placed_cubes()])
+            self._viewer.begin(self.scene, [cube.symbols for cube in self._placed_cubes()], self._pictures())
 
     def _build(self) -> None:
         """Make the scene anew, and the robot's control of it."""
-        self.scene = Scene(self.circumstances, self._placed_cubes(), self._robot)
+        self.scene = Scene(self.circumstances, self._placed_cubes(), self._robot, self._pictures())
         self.controller = ArmController(self.scene.robot, self.scene.advance)
         self.manipulator = Manipulator(self.controller, self._look_for_cube)
 
     def _placed_cubes(self) -> list[PlacedCube]:
         """Return what stands at each station when a trial begins."""
-        return [PlacedCube(self.cubes[self.object], self._position, rotation_of(self.orientation))]
+        return [PlacedCube(self._symbols(), self._position, rotation_of(self.state))]
 
     def _try(self, action: str) -> bool:
         """Carry an action out; return whether the robot could reach the cube."""
@@ -258,30 +268,28 @@ class RobonautARcubeWorld(ARcubeWorld):
             "position_error": distance,
         }
 
-    def _detect(self) -> tuple[int, int]:
+    def _look(self) -> Any:
         self._see()
         if self._viewer is not None:
             self._viewer.look(self.camera.moved(self.scene.robot.place), self.camera_picture())
-        return detected_symbols(self.markers)
+        return super()._look()
 
     def _see(self) -> None:
-        """Take a frame with the head's camera, unless nothing has moved since the last one."""
+        """Take a frame, unless nothing has moved since the last one."""
         if self._seen_at == self.scene.steps:
             return
-        camera = self.camera.moved(self.scene.robot.place)
-        self.frame = self.circumstances.imaging.frame(camera, self.scene.client, self.np_random)
-        self.markers = detect_markers(self.frame, self.camera)
+        self._perceive()
         self._seen_at = self.scene.steps
 
     def _look_for_cube(self) -> CubePose:
-        """Return where the cube is seen; a robot that sees no tag takes it to be where it should."""
+        """Return where the cube is seen; a robot that does not see it takes it to be where it should."""
         self._see()
-        return cube_pose(self.markers) or CubePose(CUBE_CENTRE, 0.0)
+        return self._found_cube() or CubePose(CUBE_CENTRE, 0.0)
 
     def _head_camera(self) -> Camera:
         eye, direction = self.scene.robot.eye()
         target = eye + direction
-        return Camera(tuple(eye.tolist()), tuple(target.tolist()), _FIELD_OF_VIEW, self._image_size, _NEAR)
+        return Camera(tuple(eye.tolist()), tuple(target.tolist()), self.field_of_view, self._image_size, _NEAR)
 
     def _observer(self) -> Camera:
         return OBSERVER
@@ -290,10 +298,7 @@ class RobonautARcubeWorld(ARcubeWorld):
         position, rotation = self.scene.cube_pose()
         _, tilt = nearest_orientation(rotation)
         return {
-            "object": self.object,
-            "orientation": self.orientation,
-            "pattern": shown_pattern(self.cubes[self.object], self.orientation),
-            "slipped": slipped,
+            **super()._truth(slipped=slipped),
             "lost": self.lost,
             "position": tuple(position.tolist()),
             "angle_from_orientation": float(np.degrees(tilt)),

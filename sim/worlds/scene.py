@@ -10,6 +10,7 @@ from typing import Final
 
 import numpy as np
 import pybullet
+from numpy.typing import NDArray
 
 from atg_fg.core.patterns import FloatArray
 from atg_fg.worlds.arcube import Cube
@@ -50,12 +51,12 @@ class PlacedCube:
     """A cube as it stands at its station when a trial begins.
 
     Attributes:
-        tags: Of its faces.
+        symbols: Of its faces.
         position: Of its centre in the station's frame, shape [3], m.
         rotation: Shape [3, 3].
     """
 
-    tags: Cube
+    symbols: Cube
     position: FloatArray
     rotation: FloatArray
 
@@ -73,6 +74,7 @@ class Scene:
         circumstances: Masses, frictions, and how the floor leans.
         cubes: One a station; the robot begins at the first.
         robot: The robot, instead of the shell.
+        pictures: What each symbol looks like, RGB, if it is not a tag.
 
     Attributes:
         cubes: One a station.
@@ -89,6 +91,7 @@ class Scene:
         circumstances: Circumstances,
         cubes: Sequence[PlacedCube],
         robot: PreparedRobot | None = None,
+        pictures: Sequence[NDArray[np.uint8]] | None = None,
     ) -> None:
         self.client: int = pybullet.connect(pybullet.DIRECT)
         # A scene that nobody closes must not keep its client until the process ends.
@@ -114,14 +117,15 @@ class Scene:
         self.tables = [self._build_table(origin) for origin in self._origins]
         self.cubes: list[CubeBody] = []
         for _ in cubes:
-            self.cubes.append(CubeBody(self.client, circumstances.cube_mass, self.cubes[0] if self.cubes else None))
+            like = self.cubes[0] if self.cubes else None
+            self.cubes.append(CubeBody(self.client, circumstances.cube_mass, like, pictures))
         self.robot = RobotBody(self.client, robot, STATION_SPACING * middle + _RAIL_SPARE if len(cubes) > 1 else None)
         if self.robot.rail is not None:
             self._draw_rails(STATION_SPACING * middle)
             self.robot.rail.reset(self.rail_position(0))
         self._apply(circumstances)
         for body, cube, origin in zip(self.cubes, cubes, self._origins, strict=True):
-            body.show(cube.tags)
+            body.show(cube.symbols)
             body.place(cube.position + origin, cube.rotation)
 
     def advance(self) -> None:

@@ -39,8 +39,8 @@ class SceneViewer:
         self._scene: Scene | None = None
         log_world(recording)
 
-    def begin(self, scene: Scene, cubes: Sequence[Cube]) -> None:
-        """Show a scene from now on, with these cubes one a station."""
+    def begin(self, scene: Scene, cubes: Sequence[Cube], pictures: Sequence[NDArray[np.uint8]] | None = None) -> None:
+        """Show a scene from now on, with these cubes one a station, and the pictures of symbols that are no tags."""
         if self._scene is not None:
             self._begun += self._scene.seconds
         else:
@@ -48,7 +48,7 @@ class SceneViewer:
         self._scene = scene
         self._set_time()
         for station, cube in enumerate(cubes):
-            log_cube(self._recording, f"world/cube_{station}", cube)
+            log_cube(self._recording, f"world/cube_{station}", cube, pictures)
         self._show_poses()
         before = scene.on_step
 

@@ -16,7 +16,7 @@ from atg_fg.worlds.stations import check_one_a_station, drawn_objects
 from sim.bodies.cube import CUBE_CENTRE, CUBE_SIZE, nearest_orientation
 from sim.vision.camera import Camera
 from sim.worlds.film import observer_of
-from sim.worlds.robonaut_world import RobonautARcubeWorld
+from sim.worlds.robonaut_arcube_world import RobonautARcubeWorld
 from sim.worlds.scene import STATION_SPACING, PlacedCube
 
 MOST_STATIONS: Final = 5
@@ -126,9 +126,9 @@ class RobonautTableWorld(RobonautARcubeWorld):
             PlacedCube(self.cubes[each.object], CUBE_CENTRE, rotation_of(each.orientation)) for each in self._presented
         ]
 
-    def _see(self) -> None:
+    def _perceive(self) -> None:
         """Take a frame, and leave out the tags of cubes that are not before the robot."""
-        super()._see()
+        super()._perceive()
         self.markers = [
             marker
             for marker in self.markers

@@ -8,7 +8,7 @@ from atg_fg.core.errors import InvalidInputError
 from sim.bodies.cube import CUBE_CENTRE
 from sim.manipulation import preparation
 from sim.manipulation.preparation import prepared
-from sim.worlds.robonaut_world import RobonautARcubeWorld
+from sim.worlds.robonaut_arcube_world import RobonautARcubeWorld
 from tests.sim import descriptions
 from tests.sim.descriptions import written
 

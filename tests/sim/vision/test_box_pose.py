@@ -29,7 +29,7 @@ def test_poses_are_right_to_millimetres_whatever_is_on_the_box():
     errors = []
     for number in range(96):
         frame, true = drawn_at(camera, rng, number % 24)
-        found = find_box(frame, camera.empty, camera.project)
+        found = find_box(frame, camera.empty, camera.camera.project)
         if found is not None:
             errors.append(np.abs(found - true))
     assert len(errors) >= 93
@@ -42,10 +42,10 @@ def test_poses_are_right_to_millimetres_whatever_is_on_the_box():
 def test_what_is_no_box_is_not_taken_for_one():
     camera = PictureBoxCamera(Camera(), **STILL)
     empty = np.round(camera.empty).astype(np.uint8)
-    assert find_box(empty, camera.empty, camera.project) is None
+    assert find_box(empty, camera.empty, camera.camera.project) is None
     pole = empty.copy()
     pole[20:200, 150:170] = 0
-    assert find_box(pole, camera.empty, camera.project) is None
+    assert find_box(pole, camera.empty, camera.camera.project) is None
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,8 @@ from atg_fg.worlds.registry import make_world
 from sim.bodies.cube import CUBE_CENTRE
 from sim.vision.cube_pose import CubePose
 from sim.worlds.domain_randomization import Circumstances, Condition
-from sim.worlds.robonaut_world import LARGEST_OFFSET, RobonautARcubeWorld
+from sim.worlds.robonaut_arcube_world import RobonautARcubeWorld
+from sim.worlds.robonaut_world import LARGEST_OFFSET
 
 FLIP, LEFT, RIGHT = (np.int64(action) for action in range(3))
 
