@@ -57,8 +57,9 @@ def read_header(
     if world not in WORLDS:
         return parameters, assumptions
     try:
-        # What makes features may be code of a user's own, which no file may name; nothing here depends on it.
-        known = {name: value for name, value in options.items() if name != "features"}
+        # Code that makes features and the description of a robot are a user's own: no file may name them, and nothing
+        # here depends on them.
+        known = {name: value for name, value in options.items() if name not in ("features", "urdf")}
         with closing(make_world(world, n_objects=_FEW, objects_seed=0, **known)) as made:
             return parameters, replace(assumptions_of(made, n_objects), n_objects=n_objects)
     except (AtgError, TypeError, ValueError, AssertionError) as error:  # the last two are of Gymnasium's own options

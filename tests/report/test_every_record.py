@@ -15,7 +15,7 @@ from atg_fg.storage.trial_log import to_line
 from atg_fg.worlds.registry import ARCUBE_WORLDS, WORLDS
 from tests.cli.conftest import run as run  # a fixture
 
-SIMULATED = ("rendered", "robonaut")
+SIMULATED = ("rendered", "robonaut", "robonaut-picture-box")
 N_TRIALS = 2
 
 
@@ -92,8 +92,8 @@ def test_a_test_in_the_simulator(world, run, tmp_path):
     test_a_test_in_a_log_and_in_a_database(world, "default", "bayes-filter", run, tmp_path)
 
 
-def test_the_worlds_that_are_simulated_are_of_arcubes():
-    assert set(SIMULATED) == set(ARCUBE_WORLDS) - {"ideal"}
+def test_the_worlds_that_are_simulated_are_all_tried():
+    assert set(SIMULATED) == {*ARCUBE_WORLDS, *(name for name in WORLDS if name.startswith("robonaut"))} - {"ideal"}
 
 
 def test_a_policy_of_ones_own_is_a_label_in_a_report(run, tmp_path, monkeypatch):
