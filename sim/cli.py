@@ -33,6 +33,9 @@ def reliability(
     stations: Annotated[
         int, typer.Option(min=1, help="Cubes in the scene; the robot goes to a random one each time.")
     ] = 1,
+    pictures: Annotated[
+        bool, typer.Option("--pictures", help="Boxes with pictures in place of cubes with tags.")
+    ] = False,
     seed: Annotated[int, typer.Option(min=0, help="Seed of cubes, actions and circumstances.")] = 0,
     urdf: options.Urdf = None,
     jobs: options.Jobs = None,
@@ -44,11 +47,13 @@ def reliability(
     """
     from sim.reliability import summarise
 
-    runs = _run(condition, actions, stations, seed, urdf, jobs, json_file)
+    runs = _run(condition, actions, stations, pictures, seed, urdf, jobs, json_file)
     summary = summarise(runs)
     parameters = {"condition": condition, "actions": actions, "seed": seed}
     if stations > 1:
         parameters["stations"] = stations
+    if pictures:
+        parameters["pictures"] = True
     if urdf is not None:
         parameters["urdf"] = str(urdf)
     options.write_json({"command": "sim reliability", "parameters": parameters, **summary}, json_file)
@@ -141,14 +146,22 @@ def webcam(
 
 
 def _run(
-    condition: str, actions: int, stations: int, seed: int, urdf: Path | None, jobs: int | None, json_file: str | None
+    condition: str,
+    actions: int,
+    stations: int,
+    pictures: bool,
+    seed: int,
+    urdf: Path | None,
+    jobs: int | None,
+    json_file: str | None,
 ) -> list[Any]:
     """Check the options and run the actions, with a progress bar."""
     from sim.reliability import ACTIONS_A_TRIAL, run_actions
 
     options.check_json_option(json_file)
     with options.progress_bar("trials", -(-actions // ACTIONS_A_TRIAL)) as advance:
-        return run_actions(condition, actions, seed, jobs or options.available_cpus(), urdf, advance, stations)
+        n_jobs = jobs or options.available_cpus()
+        return run_actions(condition, actions, seed, n_jobs, urdf, advance, stations, pictures)
 
 
 def _reliability_table(title: str, summary: dict[str, Any]) -> Table:
@@ -156,7 +169,9 @@ def _reliability_table(title: str, summary: dict[str, Any]) -> Table:
     for heading in ("", "count", "rate", "95% interval"):
         table.add_column(heading, justify="left" if not heading else "right")
     rows = {"right": summary["success"], **{f"  {name}": rate for name, rate in summary["by_action"].items()}}
-    rows |= {f"{name.replace('_', ' ')} detected": rate for name, rate in summary["detection"].items()}
+    rows |= {f"{name.replace('_', ' ')} detected": rate for name, rate in summary.get("detection", {}).items()}
+    boxes = summary.get("boxes", {})
+    rows |= {"box found": boxes["found"]} if boxes else {}
     for name, rate in rows.items():
         if rate["of"]:
             low, high = rate["interval95"]
@@ -173,6 +188,10 @@ def _reliability_table(title: str, summary: dict[str, Any]) -> Table:
         "peak force of a hand, N": (summary["peak_force_newtons"], 1.0),
         "simulated seconds an action": (summary["simulated_seconds_per_action"], 1.0),
     }
+    if boxes:
+        spreads["box found off by, mm"] = (boxes["position_error_metres"], 1000.0)
+        spreads["box found turned off by, degrees"] = (boxes["yaw_error_degrees"], 1.0)
+        spreads["weighed too heavy, %"] = (boxes["mass_error"] or {}, 100.0)
     for name, (spread, unit) in spreads.items():
         texts = (f"{key} {unit * value:.2f}" for key, value in spread.items() if value is not None)
         table.add_row(name, *texts)

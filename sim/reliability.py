@@ -1,4 +1,4 @@
-"""How well the robot turns the cube: many random actions, scored by the simulator's truth."""
+"""How well the robot turns a cube or a box: many random actions, scored by the simulator's truth."""
 
 from __future__ import annotations
 
@@ -21,6 +21,8 @@ from sim.bodies.prepared_robot import PreparedRobot
 from sim.manipulation.preparation import prepared
 from sim.worlds.domain_randomization import condition_named
 from sim.worlds.robonaut_arcube_world import RobonautARcubeWorld
+from sim.worlds.robonaut_picture_box_world import RobonautPictureBoxWorld
+from sim.worlds.robonaut_world import RobonautWorld
 from sim.worlds.stations_world import RobonautTableWorld
 
 #: Actions between two new cubes, as in a trial.
@@ -50,8 +52,23 @@ class Look:
 
 
 @dataclass(frozen=True)
+class Fit:
+    """Where a box without tags was found at a look, beside where it is, and what it was felt to weigh.
+
+    Attributes:
+        position_error: m; ``None`` if it was not found.
+        yaw_error: Of its angle about the vertical, degrees; ``None`` if it was not found.
+        mass_error: Share of its mass that it was weighed too heavy; ``None`` if it was not weighed.
+    """
+
+    position_error: float | None
+    yaw_error: float | None
+    mass_error: float | None
+
+
+@dataclass(frozen=True)
 class ScoredAction:
-    """One action and what came of it, by the simulator's truth (``info`` of ``RobonautARcubeWorld.step``)."""
+    """One action and what came of it, by the simulator's truth (``info`` of ``RobonautWorld.step``)."""
 
     name: str
     info: dict[str, Any]
@@ -63,7 +80,8 @@ class Run:
 
     Attributes:
         actions: The actions, in order.
-        looks: The looks at a cube that was not lost.
+        looks: The looks at tags of a cube that was not lost.
+        fits: The looks at a box without tags that was not lost.
         velocity: Greatest speed of each joint as a share of its limit, shape [2, 7].
         effort: Greatest torque of each joint as a share of its limit, shape [2, 7].
         saturated_steps: Steps in which a torque was cut at its limit.
@@ -76,6 +94,7 @@ class Run:
     effort: FloatArray
     actions: list[ScoredAction] = field(default_factory=list)
     looks: list[Look] = field(default_factory=list)
+    fits: list[Fit] = field(default_factory=list)
     saturated_steps: int = 0
     self_contacts: int = 0
     steps: int = 0
@@ -90,6 +109,7 @@ def run_actions(
     urdf: Path | None = None,
     on_trial: Callable[[], None] | None = None,
     n_stations: int = 1,
+    pictures: bool = False,
 ) -> list[Run]:
     """Let the robot do random actions, a new cube every ten, and return what came of them.
 
@@ -105,16 +125,19 @@ def run_actions(
         urdf: A user's own description of the robot.
         on_trial: Called after each trial.
         n_stations: Cubes in the scene.
+        pictures: Whether boxes with pictures are turned, not cubes with tags.
     """
     condition_named(condition)
     for name, number in (("actions", n_actions), ("jobs", jobs), ("stations", n_stations)):
         if number < 1:
             raise InvalidInputError(f"{name}: {number}; expected a whole number of at least 1")
+    if pictures and n_stations > 1:
+        raise InvalidInputError(f"stations: {n_stations}; expected 1 for boxes with pictures")
     robot = None if urdf is None else prepared(urdf)
     runs: list[Run] = []
     left = n_actions
     spawner = np.random.SeedSequence(seed)
-    run_one = partial(_run_trial, condition, robot, n_stations)
+    run_one = partial(_run_trial, condition, robot, n_stations, pictures)
     while left > 0:
         lengths = [ACTIONS_A_TRIAL] * (left // ACTIONS_A_TRIAL)
         lengths += [left % ACTIONS_A_TRIAL] if left % ACTIONS_A_TRIAL else []
@@ -126,26 +149,30 @@ def run_actions(
 
 
 def _run_trial(
-    condition: str, robot: PreparedRobot | None, n_stations: int, piece: tuple[int, np.random.SeedSequence]
+    condition: str,
+    robot: PreparedRobot | None,
+    n_stations: int,
+    pictures: bool,
+    piece: tuple[int, np.random.SeedSequence],
 ) -> Run:
     n_actions, seed = piece
     rng = np.random.default_rng(seed)
-    with closing(_world(condition, robot, n_stations)) as world:
+    with closing(_world(condition, robot, n_stations, pictures)) as world:
         begun = time.perf_counter()
         observation, info = world.reset(seed=int(rng.integers(2**31)))
         run = Run(world.controller.exertion.velocity, world.controller.exertion.effort)
-        run.looks.append(Look(tuple(observation.tolist()), info["pattern"]))
+        _take_account(run, world, observation, info)
         for action in rng.integers(len(_ACTIONS), size=n_actions):
             if n_stations > 1:
                 observation, _, _, _, info = world.step(len(_ACTIONS) + rng.integers(n_stations))
                 if info["lost"]:
                     break
-                run.looks.append(Look(tuple(observation.tolist()), info["pattern"]))
+                _take_account(run, world, observation, info)
             observation, _, _, _, info = world.step(action)
             run.actions.append(ScoredAction(_ACTIONS[action], info))
             if info["lost"]:
                 break
-            run.looks.append(Look(tuple(observation.tolist()), info["pattern"]))
+            _take_account(run, world, observation, info)
         run.wall_seconds = time.perf_counter() - begun
         exertion = world.controller.exertion
         run.velocity, run.effort, run.saturated_steps = exertion.velocity, exertion.effort, exertion.saturated_steps
@@ -153,7 +180,17 @@ def _run_trial(
     return run
 
 
-def _world(condition: str, robot: PreparedRobot | None, n_stations: int) -> RobonautARcubeWorld:
+def _take_account(run: Run, world: RobonautWorld, observation: Any, info: dict[str, Any]) -> None:
+    """Keep what came of a look."""
+    if isinstance(world, RobonautPictureBoxWorld):
+        run.fits.append(Fit(**world.errors()))
+    else:
+        run.looks.append(Look(tuple(observation.tolist()), info["pattern"]))
+
+
+def _world(condition: str, robot: PreparedRobot | None, n_stations: int, pictures: bool) -> RobonautWorld:
+    if pictures:
+        return RobonautPictureBoxWorld(condition=condition, urdf=robot)
     if n_stations == 1:
         return RobonautARcubeWorld(condition=condition, urdf=robot)
     return RobonautTableWorld(n_stations=n_stations, condition=condition, urdf=robot)
@@ -162,7 +199,6 @@ def _world(condition: str, robot: PreparedRobot | None, n_stations: int) -> Robo
 def summarise(runs: Sequence[Run]) -> dict[str, Any]:
     """Return rates with 95 % Wilson intervals, errors, forces, and times of a list of runs."""
     actions = [action for run in runs for action in run.actions]
-    looks = [look for run in runs for look in run.looks]
     right = [action for action in actions if action.info["right"]]
     steps = sum(run.steps for run in runs)
     return {
@@ -184,12 +220,7 @@ def summarise(runs: Sequence[Run]) -> dict[str, Any]:
         "peak_force_newtons": _spread(action.info["peak_force"] for action in actions),
         "squarings_per_action": float(np.mean([action.info["squarings"] for action in actions])),
         "simulated_seconds_per_action": _spread(action.info["simulated_seconds"] for action in actions),
-        "detection": {
-            "both": _rate(sum(look.n_detected == 2 for look in looks), len(looks)),
-            "one": _rate(sum(look.n_detected == 1 for look in looks), len(looks)),
-            "none": _rate(sum(look.n_detected == 0 for look in looks), len(looks)),
-            "wrong_ids": _rate(sum(look.n_wrong > 0 for look in looks), len(looks)),
-        },
+        **_of_looks([look for run in runs for look in run.looks], [fit for run in runs for fit in run.fits]),
         "joints": {
             "largest_share_of_velocity_limit": float(max(run.velocity.max() for run in runs)),
             "largest_share_of_effort_limit": float(max(run.effort.max() for run in runs)),
@@ -200,6 +231,29 @@ def summarise(runs: Sequence[Run]) -> dict[str, Any]:
             "wall_seconds_per_action": sum(run.wall_seconds for run in runs) / len(actions),
             "steps_per_wall_second": steps / sum(run.wall_seconds for run in runs),
         },
+    }
+
+
+def _of_looks(looks: Sequence[Look], fits: Sequence[Fit]) -> dict[str, Any]:
+    """Return what was made of looks: at tags, or at boxes without."""
+    if not fits:
+        return {
+            "detection": {
+                "both": _rate(sum(look.n_detected == 2 for look in looks), len(looks)),
+                "one": _rate(sum(look.n_detected == 1 for look in looks), len(looks)),
+                "none": _rate(sum(look.n_detected == 0 for look in looks), len(looks)),
+                "wrong_ids": _rate(sum(look.n_wrong > 0 for look in looks), len(looks)),
+            }
+        }
+    off = [fit.mass_error for fit in fits if fit.mass_error is not None]
+    return {
+        "boxes": {
+            "found": _rate(sum(fit.position_error is not None for fit in fits), len(fits)),
+            "position_error_metres": _spread(fit.position_error for fit in fits if fit.position_error is not None),
+            "yaw_error_degrees": _spread(fit.yaw_error for fit in fits if fit.yaw_error is not None),
+            "weighed": len(off),
+            "mass_error": {"mean": float(np.mean(off)), "deviation": float(np.std(off))} if off else None,
+        }
     }
 
 

@@ -66,6 +66,23 @@ class RobonautPictureBoxWorld(RobonautWorld, BoxesWithPictures):
             cv2.polylines(drawn, [outline], True, SLOT_COLOURS[slot], 2, cv2.LINE_AA)
         return beside(drawn, self.crops)
 
+    def errors(self) -> dict[str, float | None]:
+        """Return how far off the truth the last look and the last action were: position, m, yaw, degrees, mass, share.
+
+        For scoring only. ``None`` stands for a box that was not found, or not weighed.
+        """
+        mass = None if self.weighed is None else self.weighed / self.circumstances.cube_mass - 1
+        if self.box is None:
+            return {"position_error": None, "yaw_error": None, "mass_error": mass}
+        position, rotation = self.scene.cube_pose()
+        level = rotation[:, np.abs(rotation[2]).argmin()]
+        yaw = (self.box.yaw - np.arctan2(level[1], level[0]) + np.pi / 4) % (np.pi / 2) - np.pi / 4
+        return {
+            "position_error": float(np.linalg.norm(self.box.centre - position)),
+            "yaw_error": float(abs(np.degrees(yaw))),
+            "mass_error": mass,
+        }
+
     def _place(self) -> None:
         super()._place()
         self.weighed = None
