@@ -5,7 +5,7 @@ import pytest
 
 from atg_fg.core.errors import InvalidInputError, UnknownNameError
 from sim.noise_calibration import Counts, calibrate, read_counts
-from sim.reliability import Look, Run, ScoredAction, run_actions, summarise
+from sim.reliability import Fit, Look, Run, ScoredAction, run_actions, summarise
 
 
 def scored(name="flip", **info):
@@ -74,6 +74,32 @@ def test_errors_are_those_of_the_actions_that_came_out_right():
 
 def test_a_summary_is_json():
     assert json.loads(json.dumps(summarise(RUNS), allow_nan=False)) == summarise(RUNS)
+
+
+def test_boxes_without_tags_are_counted_by_how_well_they_were_found_and_weighed():
+    run = a_run([scored(), scored("left")], [])
+    run.fits = [Fit(None, None, None), Fit(0.001, 0.2, 0.1), Fit(0.003, 0.4, -0.1)]
+    summary = summarise([run])
+    assert "detection" not in summary
+    boxes = summary["boxes"]
+    assert (boxes["found"]["count"], boxes["found"]["of"]) == (2, 3)
+    assert boxes["position_error_metres"]["mean"] == pytest.approx(0.002)
+    assert boxes["yaw_error_degrees"]["max"] == 0.4
+    assert (boxes["weighed"], boxes["mass_error"]) == (2, {"mean": 0.0, "deviation": pytest.approx(0.1)})
+    assert json.loads(json.dumps(summary, allow_nan=False)) == summary
+
+
+def test_boxes_stand_on_one_table():
+    with pytest.raises(InvalidInputError, match="stations: 3; expected 1 for boxes with pictures"):
+        run_actions("nominal", 1, n_stations=3, pictures=True)
+
+
+@pytest.mark.slow
+def test_boxes_with_pictures_are_turned_as_reliably_as_cubes():
+    (run,) = run_actions("nominal", 4, seed=1, pictures=True)
+    summary = summarise([run])
+    assert (summary["success"]["count"], summary["boxes"]["found"]["count"]) == (4, 5)
+    assert summary["boxes"]["position_error_metres"]["max"] < 0.006
 
 
 def test_an_action_without_a_try_has_no_rate():
