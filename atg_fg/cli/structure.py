@@ -18,7 +18,7 @@ from atg_fg.display import figures
 from atg_fg.display.completed_picture import draw_completed_atg, probability_text
 from atg_fg.display.structure_picture import draw_structure
 from atg_fg.display.structure_words import action_text, register_names
-from atg_fg.learning.believed_structure import BelievedStructure
+from atg_fg.learning.believed_structure import BelievedStructure, UncertainObjects
 from atg_fg.learning.completion import CompletedGraph, completed_atg, statuses
 from atg_fg.learning.predictive_checks import summary_of_evidence
 from atg_fg.learning.shared_structure import SharedStructure
@@ -50,9 +50,12 @@ def structure(
     believed = learned.learner.believed(learned.names) if learned is not None else []
     if name is not None:
         memory[name]  # refused before anything is written
-    if learned is None or not believed:
+    uncertain = learned.learner.uncertain(learned.names) if learned is not None else None
+    if learned is None or not (believed or _members(uncertain, learned)):
         _tell_none(file, learned, plot, json_file)
         return
+    if plot is not None and not believed:
+        raise InvalidInputError(f"--plot: {file} has no learned structure to draw: its objects have uncertain actions")
     completed = {each: completed_atg(learned, each, believed) for each in ([name] if name else learned.names)}
     if plot is not None:
         figure = draw_structure(believed[0].structure, memory.assumptions)
@@ -114,10 +117,26 @@ def _document(
             _structure_document(each, learner.gain + math.log(each.weight / believed[0].weight), memory)
             for each in believed
         ],
+        **_uncertain_document(memory),
         "objects": [
             {"name": name, "follows": graph.graph["follows"], **statuses(graph)} for name, graph in completed.items()
         ],
     }
+
+
+def _members(kind: UncertainObjects | None, memory: StructuredMemory) -> list[str]:
+    """Return the names of the objects whose actions are probably uncertain."""
+    is_one = [] if kind is None else (kind.members > 0.5).tolist()
+    return [name for name, member in zip(memory.names, is_one, strict=False) if member]
+
+
+def _uncertain_document(memory: StructuredMemory) -> dict[str, Any]:
+    """Return what is known of objects whose actions are uncertain, if there are any."""
+    kind = memory.learner.uncertain(memory.names)
+    members = _members(kind, memory)
+    if kind is None or not members:
+        return {}
+    return {"uncertain": {**kind.noise._asdict(), "share": kind.share, "members": members}}
 
 
 def _structure_document(each: BelievedStructure, gain: float, memory: StructuredMemory) -> dict[str, Any]:
@@ -156,7 +175,11 @@ def _graph_document(graph: CompletedGraph) -> dict[str, Any]:
 def _what_kind(n_members: int, n_poses: int, n_modes: int) -> str:
     """Return what kind of thing the followers of a structure are, in words."""
     modes = f" in {n_modes} modes" if n_modes > 1 else ""
-    return f"a kind of {n_members} object{'' if n_members == 1 else 's'} with {n_poses} poses{modes}"
+    return f"a kind of {_objects(n_members)} with {n_poses} poses{modes}"
+
+
+def _objects(number: int) -> str:
+    return f"{number} object{'' if number == 1 else 's'}"
 
 
 def _tell(file: Path, document: dict[str, Any]) -> None:
@@ -178,6 +201,13 @@ def _tell(file: Path, document: dict[str, Any]) -> None:
                 indices = [registers.index(source) for source in sources]
                 where = f"mode {mode + 1} → {maps['next'][action] + 1}, " if len(modes) > 1 else ""
                 console.print(f"  {where}{action}: {action_text(indices, registers)}", soft_wrap=True)
+    if "uncertain" in document:
+        kind = document["uncertain"]
+        console.print(
+            f"uncertain actions, α = {kind['concentration']:g}, δ = {kind['noise']:g}: "
+            f"a kind of {_objects(len(kind['members']))}, plain ATGs",
+            soft_wrap=True,
+        )
     rates = ", ".join(f"{name} {value:.4f}" for name, value in document["rates"].items())
     console.print(f"rates: {rates}")
     table = Table()

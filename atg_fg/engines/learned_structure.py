@@ -1,7 +1,8 @@
 """Recognition where objects may follow a structure that all of them share, learned from all trials in memory.
 
-Each object either follows one of the structures that are believed in, or is a plain ATG. So next to the Bayes filter of
-the plain ATGs there is a filter over pose and contents for each structure, and the belief over identity sums over them.
+Each object either follows one of the structures that are believed in, or is a plain ATG, whose actions may be
+uncertain. So next to the Bayes filter of the plain ATGs there is one of those whose actions are uncertain, and a filter
+over pose and contents for each structure, and the belief over identity sums over them.
 A memory that has learned no structure leaves the Bayes filter alone.
 """
 
@@ -16,14 +17,16 @@ from atg_fg.core.actions import AnyAction, UncertainAction
 from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.log_math import log_of, log_sum_exp
 from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, FloatArray
 from atg_fg.core.records import Mistake
 from atg_fg.engines.bayes_filter import BayesFilter
+from atg_fg.engines.followed_plain import FollowedPlain
 from atg_fg.inference.belief_components import LEAST_PROBABILITY, BeliefComponent, components_of, shown_patterns_of
 from atg_fg.inference.belief_tree import BeliefNode
 from atg_fg.inference.chain import forward_backward
 from atg_fg.inference.interface import TrialSetup
-from atg_fg.inference.recognition_model import COLLECTION
+from atg_fg.inference.recognition_model import COLLECTION, RecognitionModel
 from atg_fg.learning.believed_structure import BelievedStructure
 from atg_fg.learning.completion import pose_graph
 from atg_fg.learning.evidence_learner import BelievedChain
@@ -38,6 +41,8 @@ from atg_fg.learning.structured_memory import StructuredMemory
 
 #: A structure less probable than this, given the trial so far, is left out of the rest of it.
 RULED_OUT: Final = 1e-9
+#: If no object is more probable than this to have uncertain actions, none is taken to have.
+NEGLIGIBLE: Final = 2e-3
 
 
 class LearnedStructure(BayesFilter):
@@ -60,12 +65,25 @@ class LearnedStructure(BayesFilter):
             believed, rates = self.memory.learner.believed(self.memory.names), self.memory.learner.rates
         followers = [each.weight * np.append(each.followers, each.share) for each in believed]
         self._log_plain = log_of(np.maximum(1.0 - sum(followers, np.zeros(self.model.n_hypotheses)), 0.0))
-        self._followed: list[FollowedStructure | FollowedChain] = [
+        self._followed: list[FollowedStructure | FollowedChain | FollowedPlain] = [
             FollowedStructure(each, log_of(self.model.prior * follow), rates, self.memory)
             for each, follow in zip(believed, followers, strict=True)
         ]
         if self.parameters.learn_structure and isinstance(self.memory, StructuredMemory):
+            self._follow_uncertain(self.memory, sum(followers, np.zeros(self.model.n_hypotheses)))
             self._follow_chains(self.memory)
+
+    def _follow_uncertain(self, memory: StructuredMemory, followers: FloatArray) -> None:
+        """Add the plain ATGs whose actions are uncertain, unless that is next to impossible of all objects."""
+        uncertain = memory.learner.uncertain(memory.names)
+        if uncertain is None:
+            return
+        members = np.append(uncertain.members, uncertain.share)
+        if members.max() < NEGLIGIBLE:
+            return
+        self._log_plain = log_of(np.maximum(1.0 - followers - members, 0.0))
+        model = RecognitionModel(memory, ModelParameters(*uncertain.noise), self.prior)
+        self._followed.append(FollowedPlain(model, log_of(model.prior * members), self.history))
 
     def _follow_chains(self, memory: StructuredMemory) -> None:
         """Add the chains that were sampled from all raw trials, with the weight that their evidence gives them."""
@@ -239,6 +257,10 @@ class LearnedStructure(BayesFilter):
         plain = weights[0] / sum(weights)
         mixed = [plain * marginal for marginal in marginals]
         for each, weight in zip(self._followed, weights[1:], strict=True):
+            if isinstance(each, FollowedPlain):
+                for aspects, own in zip(mixed, each.smoothed_aspects(hypothesis) if weight > 0 else [], strict=False):
+                    aspects += weight / sum(weights) * own
+                continue
             patterns = each.smoothed_patterns(hypothesis, self) if weight > 0 else []
             for aspects, shown in zip(mixed, patterns, strict=False):
                 states = self.model.aspect_of[hypothesis].copy()

@@ -1,26 +1,25 @@
-"""A structure that is believed in, with what it says of the remembered objects."""
+"""What is believed of the kinds of objects: structures, and actions that are uncertain."""
 
 from __future__ import annotations
 
 from typing import NamedTuple
 
 from atg_fg.core.patterns import FloatArray
+from atg_fg.learning.plain_evidence import PlainNoise
 from atg_fg.learning.shared_structure import SharedStructure
 
 
 class BelievedStructure(NamedTuple):
     """A structure with the weight it has, and what it says of the K remembered objects.
 
-    Structures of one set are kinds beside each other: an object follows one of them or is plain. Sets exclude each
-    other.
+    An object follows one of the structures, or is plain. Sets of structures exclude each other.
 
     Attributes:
         structure: The structure.
-        weight: p(its set | all trials); with those of the other sets and of *no structure* it sums to one.
-        followers: Probability of each object to follow it, shape [K].
+        weight: p(the sets that it is in | all trials).
+        followers: Probability of each object to follow it, given that weight, shape [K].
         contents: What each object has in its registers, shape [K, P, S].
-        share: Probability of an object that was never met to follow it.
-        kinds: Number of its set.
+        share: Probability of an object that was never met to follow it, given that weight.
     """
 
     structure: SharedStructure
@@ -28,4 +27,17 @@ class BelievedStructure(NamedTuple):
     followers: FloatArray
     contents: FloatArray
     share: float
-    kinds: int
+
+
+class UncertainObjects(NamedTuple):
+    """What is believed of plain objects whose actions are uncertain.
+
+    Attributes:
+        noise: α and δ of their ATGs.
+        members: Probability of each remembered object to be one, shape [K].
+        share: The same of an object that was never met.
+    """
+
+    noise: PlainNoise
+    members: FloatArray
+    share: float

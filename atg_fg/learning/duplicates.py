@@ -19,7 +19,6 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from itertools import groupby
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -30,7 +29,7 @@ from atg_fg.core.log_math import log_of
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import FloatArray
-from atg_fg.learning.believed_structure import BelievedStructure
+from atg_fg.learning.believed_structure import BelievedStructure, UncertainObjects
 from atg_fg.learning.learner import StructureLearner
 from atg_fg.learning.likelihood import score_trials
 from atg_fg.learning.structured_memory import StructuredMemory
@@ -118,54 +117,55 @@ class _Odds:
     def __init__(self, memory: RobotMemory, parameters: ModelParameters) -> None:
         self._memory, self._parameters, self._graphs = memory, parameters, list(memory)
         self._believed: list[BelievedStructure] = []
+        self._uncertain: UncertainObjects | None = None
         self._learner = StructureLearner(memory.assumptions)
         if parameters.learn_structure and isinstance(memory, StructuredMemory):
             self._learner = memory.learner
             self._believed = memory.learner.believed(memory.names)
+            self._uncertain = memory.learner.uncertain(memory.names)
         self._log_prior = -math.log(max(memory.assumptions.n_objects - len(memory) + 1, 1))
 
     @property
     def usual_threshold(self) -> float:
         """Log odds above which two ATGs are taken for one object."""
-        return (
-            STRUCTURED_LOG_ODDS
-            if sum({each.kinds: each.weight for each in self._believed}.values()) > 0.5
-            else PLAIN_LOG_ODDS
-        )
+        is_structured = max((each.weight for each in self._believed), default=0.0) > 0.5
+        return STRUCTURED_LOG_ODDS if is_structured else PLAIN_LOG_ODDS
 
     def of(self, index: int, others: Sequence[int]) -> FloatArray:
         """Return the log odds that an ATG is of the same object as each of the others, shape [len(others)]."""
         if not others:
             return np.zeros(0)
-        plain = np.array([self._plain_factor(index, other) for other in others])
-        if not self._believed:
+        plain = np.array([self._plain_factor(index, other, self._parameters) for other in others])
+        if not self._believed and self._uncertain is None:
             return self._log_prior + plain
-        sets = [list(kinds) for _, kinds in groupby(self._believed, key=lambda each: each.kinds)]
-        terms = [log_of(np.array(1.0 - sum(kinds[0].weight for kinds in sets))) + plain]
-        for kinds in sets:
-            mine_plain, theirs_plain, plain_share = 1.0, np.ones(len(others)), 1.0
-            for each in kinds:
-                mine, theirs = each.followers[index], each.followers[list(others)]
-                weight = each.weight * mine * theirs / each.share
-                both = log_of(weight)
-                if (weight > 0).any():
-                    both = both + self._structure_factors(each, index, others)
-                terms.append(both)
-                mine_plain, theirs_plain, plain_share = (
-                    mine_plain - mine,
-                    theirs_plain - theirs,
-                    plain_share - each.share,
-                )
-            both_plain = np.maximum(mine_plain, 0.0) * np.maximum(theirs_plain, 0.0) / plain_share
-            terms.append(log_of(kinds[0].weight * both_plain) + plain)
+        terms = []
+        mine_plain, theirs_plain, plain_share = 1.0, np.ones(len(others)), 1.0
+        for each in self._believed:
+            mine, theirs = each.followers[index], each.followers[list(others)]
+            weight = each.weight * mine * theirs / each.share
+            both = log_of(weight)
+            if (weight > 0).any():
+                both = both + self._structure_factors(each, index, others)
+            terms.append(both)
+            mine_plain -= each.weight * mine
+            theirs_plain = theirs_plain - each.weight * theirs
+            plain_share -= each.weight * each.share
+        if self._uncertain is not None:
+            noise, members, share = self._uncertain
+            uncertain = np.array([self._plain_factor(index, other, ModelParameters(*noise)) for other in others])
+            mine, theirs = members[index], members[list(others)]
+            terms.append(log_of(mine * theirs / share) + uncertain)
+            mine_plain, theirs_plain, plain_share = mine_plain - mine, theirs_plain - theirs, plain_share - share
+        both_plain = np.maximum(mine_plain, 0.0) * np.maximum(theirs_plain, 0.0) / plain_share
+        terms.append(log_of(both_plain) + plain)
         total: FloatArray = np.logaddexp.reduce(np.array(terms))
         return self._log_prior + total
 
-    def _plain_factor(self, index: int, other: int) -> float:
-        """Return the log Bayes factor of the plain model."""
+    def _plain_factor(self, index: int, other: int, parameters: ModelParameters) -> float:
+        """Return the log Bayes factor of the plain model with this α and δ."""
         graph, known = self._graphs[index], self._graphs[other]
         fresh = AspectTransitionGraph(known.name, known.assumptions)
-        given, alone = (log_evidence_of_counts(graph, start, self._parameters) for start in (known, fresh))
+        given, alone = (log_evidence_of_counts(graph, start, parameters) for start in (known, fresh))
         return given - alone if alone > -math.inf else 0.0
 
     def _structure_factors(self, each: BelievedStructure, index: int, others: Sequence[int]) -> FloatArray:

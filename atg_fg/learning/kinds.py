@@ -1,23 +1,25 @@
-"""Kinds of objects: each object is of one of several kinds, a plain ATG or a follower of one of K structures.
+"""Kinds of objects: each is a plain ATG, one whose actions are uncertain, or a follower of one of K structures.
 
-Which kind an object is of is a variable of its own, with the shares of the kinds uniform beforehand. Sets of structures
-are compared by their evidence of all trials, each taken for one of a fresh object.
+Which kind an object is of is a variable of its own, with a Dirichlet prior over the shares of the kinds. Sets of
+structures are compared by their evidence of all trials, each taken for one of a fresh object.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
 
-from atg_fg.core.log_math import x_log_x
 from atg_fg.core.patterns import FloatArray
 from atg_fg.learning.candidate import Candidate
 from atg_fg.learning.pose_filter import SLIP, WRONG
 from atg_fg.learning.raw_trials import RawTrial
 
+#: Columns of what is no structure: plain, and plain with uncertain actions.
+SURE_KIND, UNCERTAIN_KIND, N_PLAIN = range(3)
+#: Dirichlet concentration of these, and of each structure 1.
+PLAIN_BEFORE: Final = (1.0, 0.05)
 #: Structures that one memory may have kinds of.
 MAX_KINDS: Final = 5
 #: A trial that takes more wrong looks than this for one of a kind, or slips and wrong looks, is none of it: a, b of
@@ -26,6 +28,13 @@ WRONG_LIMIT: Final = (1.5, 0.03)
 EVENT_LIMIT: Final = (1.5, 0.1)
 #: Nats by which such a trial is less probable than as one of a plain ATG, at least.
 REFUSED: Final = 10.0
+#: A kind that takes more of its members' looks for errors than a + b · looks is nearly right at best. It is none,
+#: however much it explains: the same mistakes come again with the same object, and a new object, whose mistakes are
+#: accidents as well, explains them as well as the right one.
+MAX_WRONG: Final = (2.0, 0.02)
+#: Sets that are believed in at once, and how many nats the others may be behind the best.
+MAX_BELIEVED: Final = 3
+BELIEVED_WITHIN: Final = 7.0
 #: Rounds in which the shares are estimated.
 _ROUNDS: Final = 20
 
@@ -34,91 +43,99 @@ class KindShares(NamedTuple):
     """Which kind n objects, or trials, are of.
 
     Attributes:
-        responsibilities: p(kind | object), being plain first, shape [n, K + 1].
-        shares: Posterior mean of the share of each kind, being plain first, shape [K + 1].
+        responsibilities: p(kind | row), the two plain kinds first, shape [n, 2 + K].
+        shares: Posterior mean of the share of each kind, shape [2 + K].
+        log_evidence: ln ∫ Π_t Σ_k π_k p(row t | k) dπ, bounded from below by the responsibilities; the bound is tight
+            where each row is clearly of one kind.
     """
 
     responsibilities: FloatArray
     shares: FloatArray
+    log_evidence: float
+
+
+class KindSet(NamedTuple):
+    """A set of kinds.
+
+    Attributes:
+        structures: Positions in the pool, ascending.
+        log_evidence: Of all trials, the prior of the structures included; −∞ if one of them is no kind.
+        trials: Which kind each trial is of.
+    """
+
+    structures: tuple[int, ...]
+    log_evidence: float
+    trials: KindShares
 
 
 def kind_table(kinds: Sequence[Candidate], plain: FloatArray, trials: Sequence[RawTrial]) -> FloatArray:
-    """Return ln p(trial | kind, a fresh object), being plain first, shape [n, K + 1].
+    """Return ln p(trial | kind, a fresh object), the two plain kinds first, shape [n, 2 + K].
 
     Args:
         kinds: K structures, scored on all trials.
-        plain: ln p(trial | plain), shape [n].
+        plain: ln p(trial | plain) of the two plain kinds, shape [n, 2].
         trials: All raw trials, of which too many errors are none of a kind's.
     """
     n_looks = np.array([len(trial.detections) for trial in trials])
-    columns = [plain]
+    columns, most = [plain], plain.max(axis=1)
     for kind in kinds:
         wrong, events = kind.events[:, WRONG], kind.events[:, WRONG] + kind.events[:, SLIP]
         errs = (wrong > WRONG_LIMIT[0] + WRONG_LIMIT[1] * n_looks) | (
             events > EVENT_LIMIT[0] + EVENT_LIMIT[1] * n_looks
         )
-        columns.append(np.where(errs, np.minimum(kind.log_evidence, plain - REFUSED), kind.log_evidence))
+        columns.append(np.where(errs, np.minimum(kind.log_evidence, most - REFUSED), kind.log_evidence))
     return np.column_stack(columns)
 
 
 def share_kinds(table: FloatArray) -> KindShares:
-    """Return which kind each row is of, given ln p(row | kind), shape [n, K + 1]; shares are uniform beforehand."""
-    n_rows, n_kinds = table.shape
-    likelihood = np.exp(table - table.max(axis=1, keepdims=True))
-    shares = np.full(n_kinds, 1.0 / n_kinds)
-    for _ in range(_ROUNDS):
-        responsibilities = likelihood * shares
-        responsibilities /= responsibilities.sum(axis=1, keepdims=True)
-        shares = (1.0 + responsibilities.sum(axis=0)) / (n_kinds + n_rows)
-    return KindShares(responsibilities, shares)
+    """Return which kind each row is of, given ln p(row | kind), shape [n, 2 + K]."""
+    from atg_fg.learning import kind_kernels  # they load Numba
+
+    before = np.array([*PLAIN_BEFORE, *[1.0] * (table.shape[1] - N_PLAIN)])
+    return KindShares(*kind_kernels.share_out(np.ascontiguousarray(table), before, _ROUNDS))
 
 
-def log_evidence_of(table: FloatArray, log_prior: float) -> float:
-    """Return ln p(structures) + ln ∫ Π_t Σ_k π_k p(trial t | k) dπ, bounded from below.
-
-    The bound is that of the responsibilities; it is tight where each trial is clearly of one kind.
-
-    Args:
-        table: ln p(trial | kind), shape [n, K + 1].
-        log_prior: ln p of all structures together.
-    """
-    following = share_kinds(table).responsibilities
-    n_rows, n_kinds = table.shape
-    expected = following.sum(axis=0)
-    explained = float((following * table).sum()) - float(x_log_x(following).sum())
-    log_shares = math.lgamma(n_kinds) - math.lgamma(n_kinds + n_rows)
-    log_shares += sum(math.lgamma(1.0 + each) for each in expected.tolist())
-    return log_prior + explained + log_shares
-
-
-def choose_kinds(pool: Sequence[Candidate], plain: FloatArray, trials: Sequence[RawTrial]) -> tuple[list[int], float]:
-    """Return which structures of a pool are kinds, as positions, and the log evidence of these kinds.
+def choose_kinds(pool: Sequence[Candidate], plain: FloatArray, trials: Sequence[RawTrial]) -> list[KindSet]:
+    """Return the sets of kinds that are believed in, best first: the best, and its best neighbours if not far behind.
 
     From none, the change that gains most is made for as long as there is one: one structure more, one less, one for
     another, or one for two.
 
     Args:
         pool: Structures, scored on all trials.
-        plain: ln p(trial | plain), shape [n].
+        plain: ln p(trial | plain) of the two plain kinds, shape [n, 2].
         trials: All raw trials.
     """
     table = kind_table(pool, plain, trials)
-    priors = [each.structure.log_prior for each in pool]
-    known: dict[frozenset[int], float] = {}
+    n_looks = np.array([len(trial.detections) for trial in trials])
+    known: dict[frozenset[int], KindSet] = {}
 
-    def evidence(kinds: frozenset[int]) -> float:
+    def of(kinds: frozenset[int]) -> KindSet:
         if kinds not in known:
-            columns = [0, *(1 + number for number in sorted(kinds))]
-            known[kinds] = log_evidence_of(table[:, columns], sum(priors[number] for number in kinds))
+            chosen = tuple(sorted(kinds))
+            shares = share_kinds(table[:, [SURE_KIND, UNCERTAIN_KIND, *(N_PLAIN + number for number in chosen)]])
+            evidence = shares.log_evidence + sum(pool[number].structure.log_prior for number in chosen)
+            following = shares.responsibilities[:, N_PLAIN:].T
+            if not all(_is_kind(pool[number], own, n_looks) for number, own in zip(chosen, following, strict=True)):
+                evidence = -np.inf
+            known[kinds] = KindSet(chosen, evidence, shares)
         return known[kinds]
 
-    chosen: frozenset[int] = frozenset()
+    best = of(frozenset())
     while True:
-        changes = [kinds for kinds in _changes(chosen, len(pool)) if len(kinds) <= MAX_KINDS]
-        best = max(changes, key=evidence, default=chosen)
-        if not evidence(best) > evidence(chosen) + 1e-6:
-            return sorted(chosen), evidence(chosen)
-        chosen = best
+        neighbours = [of(kinds) for kinds in _changes(frozenset(best.structures), len(pool))]
+        better = max(neighbours, key=lambda each: each.log_evidence, default=best)
+        if not better.log_evidence > best.log_evidence + 1e-6:
+            break
+        best = better
+    rivals = sorted(neighbours, key=lambda each: -each.log_evidence)[: MAX_BELIEVED - 1]
+    return [best, *(each for each in rivals if each.log_evidence > best.log_evidence - BELIEVED_WITHIN)]
+
+
+def _is_kind(candidate: Candidate, following: FloatArray, n_looks: FloatArray) -> bool:
+    """Return whether something follows a structure, and without many errors."""
+    wrong = float(following @ candidate.events[:, WRONG])
+    return bool(following.max() > 0.5 and wrong <= MAX_WRONG[0] + MAX_WRONG[1] * float(following @ n_looks))
 
 
 def _changes(chosen: frozenset[int], n: int) -> list[frozenset[int]]:
@@ -126,4 +143,4 @@ def _changes(chosen: frozenset[int], n: int) -> list[frozenset[int]]:
     fewer = [chosen - {number} for number in sorted(chosen)]
     pairs = [less - {number} for less in fewer for number in sorted(less)]
     added = [rest | {number} for rest in (chosen, *fewer, *dict.fromkeys(pairs)) for number in others]
-    return fewer + added
+    return [kinds for kinds in (*fewer, *added) if len(kinds) <= MAX_KINDS]

@@ -8,7 +8,7 @@ nothing to be found.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Final
 
 import numpy as np
@@ -16,11 +16,11 @@ import numpy as np
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import TooLargeError
 from atg_fg.core.patterns import FloatArray
-from atg_fg.learning.believed_structure import BelievedStructure
+from atg_fg.learning.believed_structure import BelievedStructure, UncertainObjects
 from atg_fg.learning.candidate import Candidate
-from atg_fg.learning.kinds import choose_kinds, kind_table, share_kinds
-from atg_fg.learning.likelihood import plain_log_evidence
+from atg_fg.learning.kinds import N_PLAIN, UNCERTAIN_KIND, KindSet, choose_kinds, kind_table, share_kinds
 from atg_fg.learning.milestones import is_milestone
+from atg_fg.learning.plain_evidence import USUAL, PlainEvidence, PlainNoise
 from atg_fg.learning.rates import Rates, Tally, estimate_rates
 from atg_fg.learning.raw_trials import RawTrial
 from atg_fg.learning.search import SearchPlan, propose_structures
@@ -33,18 +33,6 @@ SETTLED_GAIN: Final = 50.0
 
 #: A structure that takes this share of looks and symbols for errors is in doubt, however much it explains.
 DOUBTFUL_ERRORS: Final = 0.02
-
-
-#: A structure that takes a greater share of its followers' looks for errors is nearly right at best. It is not kept,
-#: however much it explains: the same mistakes come again with the same object, and a new object, whose mistakes are
-#: accidents as well, explains them as well as the right one. So many errors more are forgiven, for the first trials.
-MAX_WRONG: Final = 0.02
-FORGIVEN: Final = 2.0
-
-
-#: Structures that are believed in at once, and how many nats the others may be behind the best.
-MAX_BELIEVED: Final = 3
-BELIEVED_WITHIN: Final = 7.0
 
 
 #: Structures that are kept up, and how many nats they may be behind the best.
@@ -82,6 +70,7 @@ class StructureLearner:
         trials: All raw trials, in their order.
         owners: Name of the object of each.
         rates: Those in force.
+        noise: α and δ of plain objects whose actions are uncertain.
         n_evaluations: Structures scored in all searches so far.
     """
 
@@ -93,10 +82,10 @@ class StructureLearner:
         self.n_evaluations = 0
         self._objects: dict[str, int] = {}
         self._owner_indices: list[int] = []
-        self._plain: list[float] = []
+        self.noise = USUAL
+        self._plain = PlainEvidence(assumptions)
         self._candidates: list[Candidate] = []
-        self._kinds: list[Candidate] = []
-        self._log_evidence_of_kinds = -np.inf
+        self._sets: list[KindSet] = []
 
     def learn(self, owner: str, trial: RawTrial, *, search: bool = True) -> None:
         """Learn from one more trial.
@@ -107,8 +96,6 @@ class StructureLearner:
             search: Whether other structures may be searched for.
         """
         self._append(owner, trial)
-        for candidate in self._candidates:
-            candidate.extend(trial, self._owner_indices[-1], self.rates)
         self._select()
         if is_milestone(len(self.trials)):
             if search and self._is_worth_a_search():
@@ -117,34 +104,40 @@ class StructureLearner:
                 self._merge()
             self._estimate_rates()
             self._select()
+        self._estimate_noise()
 
     def restore(
-        self, owners: Sequence[str], trials: Sequence[RawTrial], structures: Sequence[SharedStructure], rates: Rates
+        self,
+        owners: Sequence[str],
+        trials: Sequence[RawTrial],
+        structures: Sequence[SharedStructure],
+        rates: Rates,
+        noise: PlainNoise = USUAL,
     ) -> None:
         """Become the learner that had these trials, candidates and rates, without searching again."""
         for owner, trial in zip(owners, trials, strict=True):
             self._append(owner, trial)
-        self.rates = rates
-        if self.trials:
-            self._candidates = [self._scored(structure) for structure in structures]
-            self._choose()
+        self.rates, self.noise = rates, noise
+        self._candidates = [Candidate(structure, self.assumptions.alphabet) for structure in structures]
+        self._choose()
 
     def settle(self) -> None:
         """Keep the best of the structures at hand, best first, and estimate the rates: trials were put together."""
-        self._select()
-        self._estimate_rates()
-        self._select()
+        if self.trials:
+            self._select()
+            self._estimate_rates()
+            self._select()
+            self._estimate_noise()
 
-    def hand_over(self, numbers: Sequence[int], owner: str) -> None:
-        """Take raw trials for those of another object, and learn the contents of all objects anew.
+    def hand_over(self, owners: Mapping[int, str]) -> None:
+        """Take raw trials for those of other objects, and learn the contents of all objects anew.
 
         Args:
-            numbers: Of the trials, in their order.
-            owner: Name of the object that they are of.
+            owners: Name of the object that each is of, by the number of the trial.
         """
-        if not numbers:
+        if not owners:
             return
-        for number in numbers:
+        for number, owner in owners.items():
             self.owners[number] = owner
         self._objects = {}
         self._owner_indices = [self._objects.setdefault(each, len(self._objects)) for each in self.owners]
@@ -153,12 +146,13 @@ class StructureLearner:
     def take_for(self, trials: Sequence[RawTrial]) -> None:
         """Take what was seen in all raw trials for something else, of the same objects, and score structures anew."""
         self.trials[:] = trials
-        self._plain = [plain_log_evidence(trial, self.assumptions) for trial in self.trials]
         self._rescore()
 
     def same_as(self, other: StructureLearner) -> bool:
         """Return whether both learned the same from the same trials."""
-        known, others = ((each.trials, each.owners, each.candidates, each.rates, each.seed) for each in (self, other))
+        known, others = (
+            (each.trials, each.owners, each.candidates, each.rates, each.noise, each.seed) for each in (self, other)
+        )
         return known == others
 
     @property
@@ -168,74 +162,88 @@ class StructureLearner:
 
     @property
     def gain(self) -> float:
-        """How many nats the best structure, or set of kinds, is better than none, its prior included.
+        """How many nats the best set of kinds is better than plain ATGs alone, its prior included.
 
-        −∞ if there is none.
+        −∞ if no structure is in it.
         """
-        plain = np.array(self._plain)
-        best = max((each.score(plain) - float(plain.sum()) for each in self._candidates), default=-np.inf)
-        return max(best, self._log_evidence_of_kinds - float(plain.sum())) if self._kinds else best
+        if not self._sets or not self._sets[0].structures:
+            return -np.inf
+        return self._sets[0].log_evidence - share_kinds(self._of_plain()).log_evidence
 
     @property
     def log_evidence(self) -> float:
-        """Ln p(all trials, each of a fresh object) of the best structures, their prior included, or of none."""
-        return float(sum(self._plain)) + max(self.gain, 0.0)
+        """Ln p(all trials, each of a fresh object) of the best set of kinds, its prior included."""
+        return self._sets[0].log_evidence if self._sets else 0.0
 
     def believed(self, names: Sequence[str]) -> list[BelievedStructure]:
         """Return the structures that are believed in, best first, for objects with these names.
 
         An object of which no trial is there follows none of them.
         """
-        return self._believed_kinds(names) if self._kinds else self._believed_alone(names)
+        n_registers = self.assumptions.alphabet.n_symbols
+        followers: dict[int, FloatArray] = {}
+        total: dict[int, float] = {}
+        for weight, each in zip(self._weights, self._sets, strict=True):
+            of = self._members(each, names)
+            for column, number in enumerate(each.structures, start=N_PLAIN):
+                total[number] = total.get(number, 0.0) + weight
+                followers[number] = followers.get(number, np.zeros(len(names) + 1)) + weight * of[:, column]
+        believed = []
+        for number in sorted(total, key=lambda number: (-total[number], -followers[number][-1])):
+            candidate, own = self._candidates[number], followers[number] / total[number]
+            contents = np.zeros((len(names), candidate.structure.n_registers, n_registers))
+            for position, name in enumerate(names):
+                if name in self._objects:
+                    contents[position] = candidate.contents[self._objects[name]]
+            believed.append(BelievedStructure(candidate.structure, total[number], own[:-1], contents, float(own[-1])))
+        return believed
 
-    def _believed_kinds(self, names: Sequence[str]) -> list[BelievedStructure]:
-        """Return the structures of the set of kinds, the one with most members first."""
-        by_trial = kind_table(self._kinds, np.array(self._plain), self.trials)
-        by_object = np.zeros((len(self._objects), by_trial.shape[1]))
+    def uncertain(self, names: Sequence[str]) -> UncertainObjects | None:
+        """Return what is believed of plain objects whose actions are uncertain; ``None`` if nothing was learned yet."""
+        if not self.trials:
+            return None
+        of = np.zeros(len(names) + 1)
+        for weight, each in zip(self._weights, self._sets, strict=True):
+            of += weight * self._members(each, names)[:, UNCERTAIN_KIND]
+        return UncertainObjects(self.noise, of[:-1], float(of[-1]))
+
+    @property
+    def _weights(self) -> list[float]:
+        """The weight of each set that is believed in; they sum to one."""
+        logarithms = np.array([each.log_evidence for each in self._sets])
+        weights = np.exp(logarithms - logarithms.max(initial=-np.inf))
+        result: list[float] = (weights / weights.sum()).tolist()
+        return result
+
+    def _members(self, kinds: KindSet, names: Sequence[str]) -> FloatArray:
+        """Return which kind each object is of, and last one that was never met, shape [K + 1, 2 + structures].
+
+        Of an object without a raw trial no structure is known to say anything.
+        """
+        shares = kinds.trials.shares
+        chosen = [self._candidates[number] for number in kinds.structures]
+        by_trial = kind_table(chosen, self._plain.of_kinds(self.noise, met_again=True), self.trials)
+        by_object = np.zeros((len(self._objects), len(shares)))
         np.add.at(by_object, self._owner_indices, by_trial)
-        of = share_kinds(by_object)
-        columns = sorted(range(1, by_trial.shape[1]), key=lambda column: -of.shares[column])
-        return [
-            self._of_names(self._kinds[column - 1], 1.0, of.responsibilities[:, column], names)._replace(
-                share=float(of.shares[column])
-            )
-            for column in columns
-        ]
-
-    def _believed_alone(self, names: Sequence[str]) -> list[BelievedStructure]:
-        """Return structures that are each the only one of its set."""
-        plain = np.array(self._plain)
-        scores = np.array([candidate.score(plain) for candidate in self._candidates])[:MAX_BELIEVED]
-        scores = scores[scores >= scores.max(initial=-np.inf) - BELIEVED_WITHIN]
-        if not len(scores):
-            return []
-        logarithms = np.append(scores, plain.sum())
-        weights = np.exp(logarithms - logarithms.max())
-        weights /= weights.sum()
-        return [
-            self._of_names(
-                candidate, weight, candidate.followers(plain, self._owner_indices, self.rates.share), names
-            )._replace(kinds=number)
-            for number, (candidate, weight) in enumerate(zip(self._candidates, weights[:-1].tolist(), strict=False))
-        ]
-
-    def _of_names(
-        self, candidate: Candidate, weight: float, followers: FloatArray, names: Sequence[str]
-    ) -> BelievedStructure:
-        """Return what a structure says of objects with these names, given the followers among those of trials."""
-        own_followers = np.zeros(len(names))
-        own_contents = np.zeros((len(names), candidate.structure.n_registers, self.assumptions.alphabet.n_symbols))
+        by_object += np.log(shares)
+        by_object = np.exp(by_object - by_object.max(axis=1, keepdims=True))
+        by_object /= by_object.sum(axis=1, keepdims=True)
+        of = np.zeros((len(names) + 1, len(shares)))
+        of[-1] = shares
         for position, name in enumerate(names):
             if name in self._objects:
-                index = self._objects[name]
-                own_followers[position], own_contents[position] = followers[index], candidate.contents[index]
-        return BelievedStructure(candidate.structure, weight, own_followers, own_contents, self.rates.share, 0)
+                of[position] = by_object[self._objects[name]]
+            else:
+                of[position, :N_PLAIN] = shares[:N_PLAIN] / shares[:N_PLAIN].sum()
+        return of
+
+    def _of_plain(self) -> FloatArray:
+        return self._plain.of_kinds(self.noise)
 
     def _append(self, owner: str, trial: RawTrial) -> None:
         self.trials.append(trial)
         self.owners.append(owner)
         self._owner_indices.append(self._objects.setdefault(owner, len(self._objects)))
-        self._plain.append(plain_log_evidence(trial, self.assumptions))
 
     def _is_worth_a_search(self) -> bool:
         """Return whether there may be a structure that explains more than those at hand.
@@ -278,109 +286,75 @@ class StructureLearner:
 
     def _unexplained(self) -> list[int]:
         """Return the numbers of the trials that probably follow no structure at hand."""
-        if not self._candidates:
-            return list(range(len(self.trials)))
-        plain = np.array(self._plain)
-        kinds = self._kinds or self._candidates[:1]
-        following = share_kinds(kind_table(kinds, plain, self.trials)).responsibilities
-        unexplained: list[int] = np.flatnonzero(following[:, 0] > 0.5).tolist()
+        plain = self._sets[0].trials.responsibilities[:, :N_PLAIN].sum(axis=1)
+        unexplained: list[int] = np.flatnonzero(plain > 0.5).tolist()
         return unexplained
 
     def _add(self, structures: Sequence[SharedStructure]) -> None:
         for structure in structures:
-            if structure in self.candidates:
-                continue
-            try:
-                self._candidates.append(self._scored(structure))
-            except TooLargeError:
-                continue  # more poses than a structure may have
+            if structure not in self.candidates and _is_believable(structure):
+                self._candidates.append(Candidate(structure, self.assumptions.alphabet))
         self._select()
 
     def _select(self) -> None:
-        """Keep the candidates that are worth it: the best alone, and the set of kinds that explains most together."""
-        pool = self._candidates
-        self._candidates = self._worth_keeping(pool)
-        reliable = [each for each in pool if each in self._candidates or self._is_plausible(each)]
-        self._candidates += [each for each in self._chosen(reliable)[0] if each not in self._candidates]
+        """Choose the sets of kinds, and keep their structures and those that are best beside them."""
         self._choose()
-
-    def _choose(self) -> None:
-        """Have the best set of kinds among the candidates, if there is one that is better than any of them alone."""
-        self._kinds, self._log_evidence_of_kinds = self._chosen(self._candidates)
-        plain = np.array(self._plain)
-        alone = max((each.score(plain) for each in self._candidates), default=-np.inf)
-        if len(self._kinds) < 2 or self._log_evidence_of_kinds <= alone:
-            self._kinds = []
-
-    def _chosen(self, pool: Sequence[Candidate]) -> tuple[list[Candidate], float]:
-        """Return the best set of kinds of a pool of which all are reliable, and its log evidence."""
-        left, plain = list(pool), np.array(self._plain)
-        while len(left) > 1:
-            numbers, log_evidence = choose_kinds(left, plain, self.trials)
-            kinds = [left[number] for number in numbers]
-            of = share_kinds(kind_table(kinds, plain, self.trials))
-            erring = [
-                kind
-                for kind, following in zip(kinds, of.responsibilities.T[1:], strict=True)
-                if not _errs_little(kind.tally(self.trials, following))
-            ]
-            if not erring:
-                return kinds, log_evidence
-            left = [each for each in left if each not in erring]
-        return [], -np.inf
-
-    def _is_plausible(self, candidate: Candidate) -> bool:
-        """Return whether most of what follows a structure, or several trials, follow it without many errors."""
-        table = kind_table([candidate], np.array(self._plain), self.trials)
-        following = share_kinds(table).responsibilities[:, 1]
-        return bool((following > 0.5).sum() >= 2)
-
-    def _rescore(self) -> None:
-        for candidate in self._candidates:
-            candidate.rescore(self.trials, self._owner_indices, self.rates)
-        if self.trials:
+        kept = list(dict.fromkeys(number for each in self._sets for number in each.structures))
+        plain = self._of_plain()
+        nothing = share_kinds(plain).log_evidence
+        alone = {}
+        for number, each in enumerate(self._candidates):
+            if number not in kept:
+                of = share_kinds(kind_table([each], plain, self.trials))
+                alone[number] = of.log_evidence + each.structure.log_prior
+        spare = sorted(
+            (number for number in alone if alone[number] > nothing - KEPT_WITHIN), key=lambda number: -alone[number]
+        )
+        kept += spare[: max(MAX_CANDIDATES - len(kept), 0)]
+        if kept != list(range(len(self._candidates))):
+            self._candidates = [self._candidates[number] for number in kept]
             self._choose()
 
-    def _scored(self, structure: SharedStructure) -> Candidate:
-        candidate = Candidate(structure, self.assumptions.alphabet)
-        candidate.rescore(self.trials, self._owner_indices, self.rates)
-        return candidate
+    def _choose(self) -> None:
+        """Choose the sets of kinds among the candidates."""
+        self._plain.catch_up(self.trials, self.owners)
+        for each in self._candidates:
+            each.catch_up(self.trials, self._owner_indices, self.rates)
+        self._sets = choose_kinds(self._candidates, self._of_plain(), self.trials) if self.trials else []
 
-    def _worth_keeping(self, pool: Sequence[Candidate]) -> list[Candidate]:
-        """Return the best candidates, best first, without those that are far behind, explain nothing or err much."""
-        plain = np.array(self._plain)
-        useful = [each for each in pool if each.responsibilities(plain).max() > 0.5 and self._is_reliable(each, plain)]
-        scored = sorted(((each.score(plain), each) for each in useful), key=lambda pair: -pair[0])
-        best = max(float(plain.sum()), scored[0][0]) if scored else 0.0
-        return [each for score, each in scored[:MAX_CANDIDATES] if score >= best - KEPT_WITHIN]
+    def _rescore(self) -> None:
+        self._plain.forget()
+        for candidate in self._candidates:
+            candidate.rescore(self.trials, self._owner_indices, self.rates)
+        self._choose()
 
-    def _is_reliable(self, candidate: Candidate, plain: FloatArray) -> bool:
-        return _errs_little(candidate.tally(self.trials, candidate.responsibilities(plain)))
+    def _estimate_noise(self) -> None:
+        """Estimate α and δ of objects whose actions are uncertain."""
+        noise = self._plain.best_noise(self._sets[0].trials.responsibilities[:, UNCERTAIN_KIND])
+        if noise != self.noise:
+            self.noise = noise
+            self._choose()
 
     def _estimate_rates(self) -> None:
-        """Estimate the rates under the best structures, if better than none, and score anew if they changed."""
-        if self.gain <= 0:
+        """Estimate the rates under the best set of kinds, if better than none, and score anew if they changed."""
+        best = self._sets[0]
+        if not best.structures:
             return
-        plain = np.array(self._plain)
-        if self._kinds:
-            of = share_kinds(kind_table(self._kinds, plain, self.trials))
-            tallies = [
-                kind.tally(self.trials, following)
-                for kind, following in zip(self._kinds, of.responsibilities.T[1:], strict=True)
-            ]
-            tally = Tally(*map(sum, zip(*tallies, strict=True)))
-            followers = 1.0 - of.responsibilities[:, 0]
-        else:
-            best = self._candidates[0]
-            followers = best.followers(plain, self._owner_indices, self.rates.share)
-            tally = best.tally(self.trials, best.responsibilities(plain))
+        tallies = [
+            self._candidates[number].tally(self.trials, following)
+            for number, following in zip(best.structures, best.trials.responsibilities.T[N_PLAIN:], strict=True)
+        ]
+        tally = Tally(*map(sum, zip(*tallies, strict=True)))
+        followers = self._members(best, list(self._objects))[:-1, N_PLAIN:].sum(axis=1)
         estimated = estimate_rates(tally, followers)
         old, new = (np.array([each.slip, each.wrong, each.repeat]) for each in (self.rates, estimated))
         if np.abs(np.log(new / old)).max() < np.log(RATE_FACTOR):
             self.rates = Rates(self.rates.slip, self.rates.wrong, self.rates.repeat, estimated.share)
             return
         self.rates = estimated
-        self._rescore()
+        for candidate in self._candidates:
+            candidate.rescore(self.trials, self._owner_indices, self.rates)
+        self._choose()
 
 
 def _is_believable(structure: SharedStructure) -> bool:
@@ -389,7 +363,3 @@ def _is_believable(structure: SharedStructure) -> bool:
     except TooLargeError:
         return False
     return True
-
-
-def _errs_little(tally: Tally) -> bool:
-    return tally.wrong <= FORGIVEN + MAX_WRONG * tally.n_looks

@@ -4,24 +4,15 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Sequence
-from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
-from atg_fg.core.assumptions import Assumptions
-from atg_fg.core.memory import RobotMemory
-from atg_fg.core.parameters import ModelParameters
-from atg_fg.core.patterns import MISSING, Evidence, FloatArray, PatternAlphabet
-from atg_fg.inference.chain import build_chain, forward_pass
-from atg_fg.inference.history import History
+from atg_fg.core.patterns import MISSING, FloatArray, PatternAlphabet
 from atg_fg.learning.pose_filter import PoseFilter
 from atg_fg.learning.rates import Rates
 from atg_fg.learning.raw_trials import RawTrial, TrialArrays, side_by_side
 from atg_fg.learning.shared_structure import SharedStructure
-
-#: Noise of the plain ATG that a structure has to explain trials better than.
-PLAIN = ModelParameters(1e-6, 1e-6, learn_in_trial=True)
 
 
 class TrialScores(NamedTuple):
@@ -82,12 +73,3 @@ def follow(own: PoseFilter, trials: TrialArrays, alphabet: PatternAlphabet) -> N
         else:
             agrees = (symbols[:, None, :] == MISSING) | (symbols[:, None, :] == alphabet.symbols)
             own.observe_likelihood(agrees.all(axis=2).astype(np.float64))
-
-
-# A memory that is read again, as after another process has written, has mostly the same trials.
-@lru_cache(maxsize=4096)
-def plain_log_evidence(trial: RawTrial, assumptions: Assumptions) -> float:
-    """Return ln p(trial) for an object never met that follows no structure: a plain ATG, learned as the trial goes."""
-    evidence = [Evidence.of_detection(assumptions.alphabet, detection) for detection in trial.detections]
-    chain = build_chain(RobotMemory(assumptions), PLAIN, History(evidence, list(trial.actions)))
-    return float(forward_pass(chain).log_joint[-1])

@@ -186,8 +186,9 @@ def _united_learner(one: _Part, two: _Part, same: Sequence[str]) -> StructureLea
     result = StructureLearner(one.memory.assumptions, learners[0].seed, learners[0].plan)
     result.n_evaluations = sum(learner.n_evaluations for learner in learners)
     structures = dict.fromkeys(structure for learner in learners for structure in learner.candidates)
-    rates = max(learners, key=lambda learner: len(learner.trials)).rates
-    result.restore([name for name, _ in taken], [trial for _, trial in taken], list(structures), rates)
+    most = max(learners, key=lambda learner: len(learner.trials))
+    owners, trials = [name for name, _ in taken], [trial for _, trial in taken]
+    result.restore(owners, trials, list(structures), most.rates, most.noise)
     if len(learners) > 1:
         result.settle()
     return result

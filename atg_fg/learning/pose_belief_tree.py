@@ -17,18 +17,19 @@ from atg_fg.core.patterns import Evidence, FloatArray, IntArray
 from atg_fg.inference.expected_entropy import expected_entropies_of_table, next_pattern_joint, pattern_table
 from atg_fg.inference.recognition_model import RecognitionModel
 from atg_fg.learning.path_filter import PathFilter
+from atg_fg.learning.plain_filter import PlainFilter
 from atg_fg.learning.pose_filter import UNIMPORTANT, PoseFilter
 
 
 class Following(NamedTuple):
-    """Objects that follow one structure.
+    """Objects of one kind.
 
     Attributes:
-        filter: Over pose and contents of each object and of *unseen*.
-        belief: p(O, the object follows it | …), shape [H].
+        filter: Over pose and contents, or the aspect, of each object and of *unseen*.
+        belief: p(O, the object is of this kind | …), shape [H].
     """
 
-    filter: PoseFilter | PathFilter
+    filter: PoseFilter | PathFilter | PlainFilter
     belief: FloatArray
 
 

@@ -183,7 +183,7 @@ class StructuredMemory(RobotMemory):
         own = [name for name in touched if name not in self._graphs or self._graphs[name] == self._estimated(name)]
         for number, name in moved.items():
             self._reassignments.append(Reassignment(len(owners), number, owners[number], name))
-            self.learner.hand_over([number], name)
+        self.learner.hand_over(moved)
         self.evidence.forget_verdict()
         for name in own:
             if name in owners:
@@ -269,16 +269,16 @@ class StructuredMemory(RobotMemory):
 
     def _merge_shared(self, keep: str, drop: str) -> tuple[int, ...]:
         trials = tuple(number for number, owner in enumerate(self.learner.owners) if owner == drop)
-        self.learner.hand_over(trials, keep)
+        self.learner.hand_over(dict.fromkeys(trials, keep))
         self.evidence.forget_verdict()
         return trials
 
     def _unmerge_shared(self, merge: Merge) -> None:
-        self.learner.hand_over(merge.trials, merge.dropped.name)
+        self.learner.hand_over(dict.fromkeys(merge.trials, merge.dropped.name))
         self.evidence.forget_verdict()
 
     def _rename_shared(self, old: str, new: str) -> None:
-        self.learner.hand_over([number for number, owner in enumerate(self.learner.owners) if owner == old], new)
+        self.learner.hand_over({number: new for number, owner in enumerate(self.learner.owners) if owner == old})
         self.evidence.forget_verdict()
         self._reassignments = [
             each._replace(old=new if each.old == old else each.old, new=new if each.new == old else each.new)

@@ -86,7 +86,8 @@ def _structure(first: RobotMemory, second: RobotMemory) -> dict[str, Any]:
     )
     if one is None or two is None:
         return {} if one is two else {"learned": [one is not None, two is not None]}
-    different = {key: [one[key], two[key]] for key in one if one[key] != two[key]}
+    # What is as usual is not written.
+    different = {key: [one.get(key), two.get(key)] for key in {**one, **two} if one.get(key) != two.get(key)}
     if "trials" in different:
         different["trials"] = [len(one["trials"]), len(two["trials"])]
     return different

@@ -15,6 +15,7 @@ from atg_fg.core.patterns import Detection, SlotLikelihoods
 from atg_fg.core.slot_checks import check_confidences, check_slots
 from atg_fg.learning.kinds import MAX_KINDS
 from atg_fg.learning.learner import MAX_CANDIDATES, StructureLearner
+from atg_fg.learning.plain_evidence import UNCERTAIN, USUAL, PlainNoise
 from atg_fg.learning.rates import PRIORS, Rates
 from atg_fg.learning.raw_trials import RawTrial
 from atg_fg.learning.shared_structure import SharedStructure
@@ -28,6 +29,7 @@ def write_learner(learner: StructureLearner, first: int = 0) -> dict[str, Any]:
         "seed": learner.seed,
         "evaluations": learner.n_evaluations,
         "rates": {name: getattr(learner.rates, name) for name in PRIORS},
+        **({"uncertain": learner.noise._asdict()} if learner.noise != USUAL else {}),
         "candidates": [write_structure(structure, learner.assumptions) for structure in learner.candidates],
         "trials": [
             {
@@ -53,7 +55,9 @@ def read_learner(value: Any, assumptions: Assumptions, names: Sequence[str], pla
     Raises:
         InvalidInputError: Anything malformed; the message names the place.
     """
-    fields = read_object(value, place, ("seed", "rates", "candidates", "trials"), optional=("evaluations", "evidence"))
+    fields = read_object(
+        value, place, ("seed", "rates", "candidates", "trials"), optional=("evaluations", "evidence", "uncertain")
+    )
     learner = StructureLearner(assumptions, whole_number(fields["seed"], f"{place}.seed", least=0))
     learner.n_evaluations = whole_number(fields.get("evaluations", 0), f"{place}.evaluations", least=0)
     candidates = read_list(fields["candidates"], f"{place}.candidates")
@@ -68,8 +72,22 @@ def read_learner(value: Any, assumptions: Assumptions, names: Sequence[str], pla
     rates = _read_rates(fields["rates"], f"{place}.rates")
     entries = read_list(fields["trials"], f"{place}.trials")
     trials = [_read_trial(entry, assumptions, names, f"{place}.trials[{index}]") for index, entry in enumerate(entries)]
-    learner.restore([owner for owner, _ in trials], [trial for _, trial in trials], structures, rates)
+    noise = _read_noise(fields["uncertain"], f"{place}.uncertain") if "uncertain" in fields else USUAL
+    learner.restore([owner for owner, _ in trials], [trial for _, trial in trials], structures, rates, noise)
     return learner
+
+
+def _read_noise(value: Any, place: str) -> PlainNoise:
+    """Return α and δ of objects whose actions are uncertain, one of those that are learned."""
+    fields = read_object(value, place, PlainNoise._fields)
+    noise = PlainNoise(*(number(fields[name], f"{place}.{name}", 0.0) for name in PlainNoise._fields))
+    if noise not in UNCERTAIN:
+        concentrations, noises = (sorted({each[part] for each in UNCERTAIN}) for part in (0, 1))
+        raise InvalidInputError(
+            f"{place}: concentration {noise.concentration}, noise {noise.noise}; "
+            f"expected one of {concentrations} and one of {noises}"
+        )
+    return noise
 
 
 def _read_trial(value: Any, assumptions: Assumptions, names: Sequence[str], place: str) -> tuple[str, RawTrial]:

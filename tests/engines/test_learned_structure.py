@@ -25,6 +25,7 @@ from atg_fg.worlds.registry import make_world
 from tests.learning import oracle
 from tests.learning.worlds import ARCUBES, CUBE, RING, RING_WORLD, cubes, objects_of, random_objects, trial_of
 from tests.models import random_case
+from tests.oracle import Oracle
 
 LEARNED = preset("learned")
 RATES = Rates(slip=0.05, wrong=0.02, repeat=1e-9, share=1 - 1e-9)
@@ -58,15 +59,43 @@ def ring_memory():
 
 
 class Reference:
-    """p(O | z) by the sum over contents, and eq. 3 by the sum over next patterns; all objects follow the ring."""
+    """p(O | z) by the sum over kinds, contents and poses, and eq. 3 by the sum over next patterns.
 
-    def __init__(self):
+    The known objects follow the ring; of what kind a new one is, the learner's shares say.
+    """
+
+    def __init__(self, learner):
         self.structure = oracle.Structure(2, RING.sources, 5, Fraction(1, 20), Fraction(1, 50))
         self.looks, self.actions = [], []
+        uncertain = learner.uncertain([])
+        share = learner.believed([])[0].share
+        sure = LEARNED.transition_concentration, LEARNED.observation_noise
+        self.plain = [(uncertain.share, uncertain.noise), (1.0 - share - uncertain.share, sure)]
+        self.share = Fraction(share)
+
+    def plain_atg(self, looks, actions, noise):
+        """p(looks | a plain ATG of which nothing is known)."""
+        trial = Oracle(
+            n_objects=1,
+            n_aspects=RING_WORLD.n_aspects,
+            n_actions=2,
+            patterns=self.structure.patterns,
+            graphs=[],
+            alpha=Fraction(str(noise[0])),
+            delta=Fraction(str(noise[1])),
+            learn_in_trial=True,
+        )
+        for time, look in enumerate(looks):
+            if time:
+                trial.act(actions[time - 1])
+            evidence = {z: Fraction(oracle.agrees(look, z)) for z in trial.Z}
+            trial.observe(evidence, None if None in look else look)
+        return sum(trial.weights.values())
 
     def joint(self, looks, actions):
         known = [self.structure.probability(each, looks, actions) / 4 for each in CONTENTS]
-        return [*known, self.structure.fresh(looks, actions) / 2]
+        plain = [Fraction(share) * self.plain_atg(looks, actions, noise) for share, noise in self.plain]
+        return [*known, (self.share * self.structure.fresh(looks, actions) + sum(plain)) / 2]
 
     def identity(self):
         joint = self.joint(self.looks, self.actions)
@@ -91,7 +120,7 @@ class Reference:
 @pytest.mark.parametrize(("contents", "missing"), [((0, 1, 2), 0.0), ((0, 3, 1), 0.25), ((4, 2, 3), 0.0)])
 def test_it_is_close_to_the_exact_posterior_of_a_small_world(ring_memory, contents, missing):
     trial = trial_of(objects_of(RING, [contents])[0], 3, np.random.default_rng(1), slip=0.05, missing=missing)
-    inference, reference = begin_trial("learned-structure", ring_memory, LEARNED), Reference()
+    inference, reference = begin_trial("learned-structure", ring_memory, LEARNED), Reference(ring_memory.learner)
     worst = 0.0
     for time, look in enumerate(trial.detections):
         if time:

@@ -7,7 +7,7 @@ from fractions import Fraction
 import numpy as np
 import pytest
 
-from atg_fg.learning.likelihood import plain_log_evidence, score_trials
+from atg_fg.learning.likelihood import score_trials
 from atg_fg.learning.pose_chain import exact_log_evidence
 from atg_fg.learning.rates import Rates
 from atg_fg.learning.shared_structure import SharedStructure
@@ -170,10 +170,3 @@ def test_a_repeated_tag_is_held_for_less_probable_but_possible():
     _, refused = score_trials(CUBE, trials, never, ARCUBES.alphabet).log_evidence
     assert usual - 10 < repeated < usual
     assert refused < repeated - 3
-
-
-def test_a_plain_atg_pays_for_each_new_pattern():
-    trial = trial_of(cubes(1)[0], 1, np.random.default_rng(0))
-    first, second = trial.detections
-    expected = -math.log(132) - (math.log(131) - math.log(23 / 24) if first != second else 0.0)
-    assert plain_log_evidence(trial, ARCUBES) == pytest.approx(expected, abs=1e-3)

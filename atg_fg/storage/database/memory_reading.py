@@ -126,7 +126,8 @@ def _add_transitions(
 def _structure(
     connection: sqlite3.Connection, text: Any, graphs: dict[Any, dict[str, Any]], place: str
 ) -> dict[str, Any]:
-    section = read_object(_json(text, place), place, ("seed", "evaluations", "rates", "candidates"), ("evidence",))
+    needed, optional = ("seed", "evaluations", "rates", "candidates"), ("evidence", "uncertain")
+    section = read_object(_json(text, place), place, needed, optional)
     trials: list[dict[str, Any]] = []
     for number, graph, observed, actions, confidences in connection.execute(
         "SELECT number, graph, observed, actions, confidences FROM raw_trials ORDER BY number"

@@ -1,0 +1,58 @@
+"""Plain ATGs whose actions are uncertain, in a trial, beside the plain ATGs whose are not."""
+
+from __future__ import annotations
+
+import copy
+
+from atg_fg.core.patterns import Evidence, FloatArray
+from atg_fg.inference.belief_components import BeliefComponent, components_of
+from atg_fg.inference.chain import build_chain, forward_backward
+from atg_fg.inference.history import History
+from atg_fg.inference.recognition_model import RecognitionModel
+from atg_fg.learning.plain_filter import PlainFilter
+
+
+class FollowedPlain:
+    """Plain ATGs with an α and δ of their own.
+
+    Args:
+        model: The tables when the trial begins.
+        log_weights: ln p(O, the object is of this kind), shape [H].
+        history: Of the trial, to learn from.
+
+    Attributes:
+        filter: Over the aspects of each object and of *unseen*.
+    """
+
+    def __init__(self, model: RecognitionModel, log_weights: FloatArray, history: History) -> None:
+        self._log_weights, self._history = log_weights, history
+        self.filter = PlainFilter(model, log_weights)
+
+    def weighted(self, log_weight: float) -> FollowedPlain:
+        """Return the same kind, a factor less probable."""
+        twin = copy.copy(self)
+        twin._log_weights = self._log_weights + log_weight
+        return twin
+
+    @property
+    def log_joint(self) -> FloatArray:
+        """Ln p(O, the object is of this kind, z_0:t | a_1:t), shape [H]."""
+        return self._log_weights + self.filter.log_evidence
+
+    def observe(self, evidence: Evidence) -> None:
+        """Take in the evidence of a look, the last of the history, and learn from it."""
+        self.filter.observe(evidence)
+        self.filter.learn_from(self._history, len(self._history.evidence) - 1)
+
+    def components(self, belief: FloatArray) -> list[BeliefComponent]:
+        """Return the component of each probable object.
+
+        Args:
+            belief: p(O, the object is of this kind | z_0:t, a_1:t), shape [H].
+        """
+        return components_of(self.filter.model, belief[:, None] * self.filter.aspects)
+
+    def smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
+        """Return p(X_s | O = hypothesis, all evidence) of every time s, each of shape [W_s]."""
+        model = self.filter.model
+        return forward_backward(build_chain(model.memory, model.parameters, self._history, [hypothesis]))

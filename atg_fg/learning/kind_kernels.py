@@ -1,0 +1,114 @@
+"""Loops of what kinds of objects there are: trials of plain ATGs for many α and δ at once, and shares of kinds.
+
+This module loads Numba.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from atg_fg.core.patterns import FloatArray, IntArray
+from atg_fg.inference.kernels.belief_kernels import (
+    Constants,
+    Tables,
+    condition,
+    learn,
+    predict,
+    spread_by_base,
+    weigh,
+)
+from atg_fg.inference.kernels.compilation import compiled
+
+
+@compiled
+def log_evidence_of_each(
+    tables: Tables,
+    sizes: tuple[int, int],
+    grid: FloatArray,
+    evidence: FloatArray,
+    actions: IntArray,
+    patterns: IntArray,
+) -> FloatArray:
+    """Return ln p(trial | hypothesis, α, δ), learned as the trial goes, shape [N, H].
+
+    Args:
+        tables: What H hypotheses know, with room for what the trial finds; not changed.
+        sizes: |G| and |𝒵|.
+        grid: α and δ, shape [N, 2].
+        evidence: Likelihood of each pattern at each look, shape [T + 1, |𝒵|].
+        actions: Between the looks, shape [T].
+        patterns: Pattern of each look, −1 if it was not complete, shape [T + 1].
+    """
+    n_rows, width = tables.pattern.shape
+    everyone = np.arange(n_rows)
+    result = np.empty((len(grid), n_rows))
+    aspects, following = np.zeros((n_rows, width)), np.zeros((n_rows, width))
+    log_identity, log_updated, identity = np.zeros(n_rows), np.zeros(n_rows), np.zeros(n_rows)
+    for number in range(len(grid)):
+        own = Tables(
+            tables.n_known.copy(),
+            tables.pattern.copy(),
+            tables.edge_start,
+            tables.n_edges.copy(),
+            tables.edges.copy(),
+            tables.counted.copy(),
+            tables.probability.copy(),
+            tables.prior_weight.copy(),
+        )
+        constants = Constants(sizes[0], sizes[1], grid[number, 0], grid[number, 1])
+        weigh(own, everyone, constants.concentration)
+        spread_by_base(own, constants, aspects)
+        log_identity[:] = 0.0
+        total = 0.0
+        for time in range(len(evidence)):
+            if time > 0:
+                predict(own, constants, aspects, actions[time - 1], following)
+                aspects, following = following, aspects
+            total += condition(own, constants, evidence[time], aspects, log_identity, following, log_updated, identity)
+            aspects, following = following, aspects
+            log_identity, log_updated = log_updated, log_identity
+            if patterns[time] >= 0:
+                counted = time > 0 and patterns[time - 1] >= 0
+                previous, action = (patterns[time - 1], actions[time - 1]) if counted else (-1, 0)
+                learn(own, constants, aspects, previous, action, patterns[time])
+        result[number] = log_identity + total
+    return result
+
+
+@compiled
+def share_out(table: FloatArray, before: FloatArray, n_rounds: int) -> tuple[FloatArray, FloatArray, float]:
+    """Return p(kind | row), shape [n, K], the shares of the kinds, shape [K], and a bound of the log evidence.
+
+    The bound is ln ∫ Π_t Σ_k π_k p(row t | kind k) dπ from below, π ~ Dirichlet(before).
+
+    Args:
+        table: ln p(row | kind), shape [n, K].
+        before: Concentration of each kind, shape [K].
+        n_rounds: In which the shares are estimated.
+    """
+    n_rows, n_kinds = table.shape
+    likelihood = np.empty_like(table)
+    for row in range(n_rows):
+        likelihood[row] = np.exp(table[row] - table[row].max())
+    total = before.sum()
+    shares = before / total
+    following = np.empty_like(table)
+    for _ in range(n_rounds):
+        expected = before.copy()
+        for row in range(n_rows):
+            following[row] = likelihood[row] * shares
+            following[row] /= following[row].sum()
+            expected += following[row]
+        shares = expected / (total + n_rows)
+    bound = math.lgamma(total) - math.lgamma(total + n_rows)
+    for kind in range(n_kinds):
+        members = 0.0
+        for row in range(n_rows):
+            share = following[row, kind]
+            members += share
+            if share > 0.0:
+                bound += share * (table[row, kind] - np.log(share))
+        bound += math.lgamma(before[kind] + members) - math.lgamma(before[kind])
+    return following, shares, bound

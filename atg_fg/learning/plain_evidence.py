@@ -1,0 +1,138 @@
+"""Raw trials as those of plain ATGs, whose actions may be uncertain: their evidence for each α and δ of a grid.
+
+What an action does is uncertain if the same action in the same aspect does not always lead to the same one. That shows
+where an object is met again, so the identity of each trial's object is summed out: which ATG a trial was taken for
+depends on what was thought of α.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Final, NamedTuple
+
+import numpy as np
+
+from atg_fg.core.aspect_graph import AspectTransitionGraph
+from atg_fg.core.assumptions import Assumptions
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.patterns import Evidence, FloatArray, IntArray
+from atg_fg.learning.raw_trials import RawTrial
+
+
+class PlainNoise(NamedTuple):
+    """α, the Dirichlet concentration beside the counted transitions, and δ, the probability of a wrong look."""
+
+    concentration: float
+    noise: float
+
+
+#: Of objects whose actions are sure.
+SURE: Final = PlainNoise(1e-6, 1e-6)
+#: What is possible where they are uncertain, with what each costs beforehand in nats: α near one and no noise are
+#: nearest at hand.
+UNCERTAIN: Final = tuple(
+    PlainNoise(alpha, delta) for alpha in (0.03, 0.1, 0.3, 0.6, 1.0, 1.5, 2.5, 4.0) for delta in (1e-8, 1e-3, 1e-2)
+)
+_COSTS: Final = np.array(
+    [0.02 * abs(math.log(alpha)) + {1e-8: 0.0, 1e-3: 0.1, 1e-2: 0.2}[delta] for alpha, delta in UNCERTAIN]
+)
+#: Where nothing says otherwise.
+USUAL: Final = PlainNoise(1.0, 1e-8)
+#: ATGs that one trial may be of, those that share most patterns with it, and the least number of these.
+MOST_RIVALS: Final = 8
+LEAST_SHARED: Final = 2
+
+
+class PlainEvidence:
+    """What each raw trial says of plain ATGs, given those before it.
+
+    Args:
+        assumptions: |O|, |G|, actions and alphabet.
+
+    Attributes:
+        fresh: ln p(trial | an object never met), sure first, then each of ``UNCERTAIN``, shape [n, 1 + N].
+        own: ln p(trial | the object that it is filed under), the same.
+        summed: ln p(trial | all trials before it), its object summed out, the same.
+    """
+
+    def __init__(self, assumptions: Assumptions) -> None:
+        self._assumptions = assumptions
+        self.forget()
+
+    def forget(self) -> None:
+        """Know no trial."""
+        self._graphs: dict[str, AspectTransitionGraph] = {}
+        self.fresh, self.own, self.summed = (np.zeros((0, 1 + len(UNCERTAIN))) for _ in range(3))
+
+    def catch_up(self, trials: Sequence[RawTrial], owners: Sequence[str]) -> None:
+        """Take in those of all raw trials that are not known yet."""
+        rows = [self._take_in(trials[number], owners[number]) for number in range(len(self.fresh), len(trials))]
+        if rows:
+            tables = zip((self.fresh, self.own, self.summed), zip(*rows, strict=True), strict=True)
+            self.fresh, self.own, self.summed = (np.vstack((table, *new)) for table, new in tables)
+
+    def _take_in(self, trial: RawTrial, owner: str) -> tuple[FloatArray, FloatArray, FloatArray]:
+        alphabet = self._assumptions.alphabet
+        looks = [Evidence.of_detection(alphabet, detection) for detection in trial.detections]
+        patterns = [look.pattern for look in looks]
+        rivals = self._rivals(set(patterns) - {None}, owner)
+        of_each = self._of_each([self._graphs[name] for name in rivals], looks, trial.actions)
+        fresh = of_each[:, -1]
+        n_objects = max(self._assumptions.n_objects, len(self._graphs) + 1)
+        weights = np.append(np.zeros(len(rivals)), math.log(n_objects - len(self._graphs))) - math.log(n_objects)
+        summed = np.logaddexp.reduce(of_each + weights, axis=1)
+        own = of_each[:, rivals.index(owner)] if owner in rivals else fresh
+        if owner not in self._graphs:
+            self._graphs[owner] = AspectTransitionGraph(owner, self._assumptions)
+        self._graphs[owner].learn(patterns, trial.actions)
+        return fresh, own, summed
+
+    def _rivals(self, patterns: set[int | None], owner: str) -> list[str]:
+        """Return the names of the ATGs that a trial may be of; with others it shares next to nothing."""
+        shared = {name: len(patterns.intersection(graph.pattern_indices)) for name, graph in self._graphs.items()}
+        likely = sorted((name for name in shared if shared[name] >= LEAST_SHARED), key=lambda name: -shared[name])
+        return list(dict.fromkeys([*([owner] if owner in shared else []), *likely[:MOST_RIVALS]]))
+
+    def _of_each(
+        self, graphs: Sequence[AspectTransitionGraph], looks: Sequence[Evidence], actions: Sequence[int]
+    ) -> FloatArray:
+        """Return ln p(trial | ATG), and last of an object never met, shape [1 + N, len(graphs) + 1]."""
+        from atg_fg.inference.kernels.memory_tables import arrays_for_trial, with_more_room
+        from atg_fg.learning import kind_kernels  # they load Numba
+
+        memory = RobotMemory(self._assumptions, graphs)
+        tables = with_more_room(arrays_for_trial(memory, 1.0, self).tables, len(looks) + 1, self._assumptions.n_aspects)
+        patterns: IntArray = np.array([-1 if look.pattern is None else look.pattern for look in looks])
+        result: FloatArray = kind_kernels.log_evidence_of_each(
+            tables,
+            (self._assumptions.n_aspects, len(self._assumptions.alphabet)),
+            np.array([SURE, *UNCERTAIN]),
+            np.array([look.likelihood for look in looks]),
+            np.array(actions, dtype=np.int64),
+            patterns,
+        )
+        return result
+
+    def of_kinds(self, noise: PlainNoise, *, met_again: bool = False) -> FloatArray:
+        """Return ln p(trial | sure), ln p(trial | uncertain) to be held against evidence of fresh objects, [n, 2].
+
+        Which of the two it is, is said by what came before it; how probable it is as one of either, by itself.
+
+        Args:
+            noise: Of objects whose actions are uncertain.
+            met_again: Whether a trial is known to be of the object that it is filed under.
+        """
+        columns = [0, 1 + UNCERTAIN.index(noise)]
+        fresh, given = self.fresh[:, columns], (self.own if met_again else self.summed)[:, columns]
+        level = np.logaddexp.reduce(fresh, axis=1) - np.logaddexp.reduce(given, axis=1)
+        table: FloatArray = given + level[:, None]
+        return table
+
+    def best_noise(self, uncertain: FloatArray) -> PlainNoise:
+        """Return what α and δ most probably are where actions are uncertain.
+
+        Args:
+            uncertain: Probability of each trial to be of such an object, shape [n].
+        """
+        return UNCERTAIN[int((uncertain @ self.summed[:, 1:] - _COSTS).argmax())]

@@ -1,0 +1,139 @@
+"""Evidence of plain ATGs against the Bayes filter, and against the sum over every path of aspects."""
+
+import itertools
+import math
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from atg_fg.core.aspect_graph import AspectTransitionGraph
+from atg_fg.core.assumptions import Assumptions
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.patterns import Evidence, PatternAlphabet
+from atg_fg.engines import begin_trial
+from atg_fg.learning.plain_evidence import SURE, UNCERTAIN, USUAL, PlainEvidence
+from atg_fg.learning.raw_trials import RawTrial
+from tests.learning.worlds import ARCUBES, Object, cubes, trial_of
+from tests.oracle import Atg, Oracle
+
+SMALL = Assumptions(3, 3, ("turn", "tip"), PatternAlphabet(("front",), 4))
+
+
+def small_trial(symbols, actions):
+    return RawTrial(tuple((symbol,) for symbol in symbols), tuple(actions))
+
+
+def exactly(trial, before, noise):
+    """ln p(trial | the object of ``before``), ln p(trial | another), ln p(trial), by every path in exact fractions."""
+    graph = AspectTransitionGraph("it", SMALL)
+    graph.learn([look[0] for look in before.detections], before.actions)
+    known = list(graph.aspects)
+    counts = {(known[x], action, known[y]): n for (x, action, y), n in graph.counts.items()}
+    alpha, delta = (Fraction(str(each)) for each in noise)
+    oracle = Oracle(
+        n_objects=3,
+        n_aspects=3,
+        n_actions=2,
+        patterns=SMALL.alphabet.patterns,
+        graphs=[Atg(known, counts)],
+        alpha=alpha,
+        delta=delta,
+        learn_in_trial=True,
+    )
+    for time, look in enumerate(trial.detections):
+        if time:
+            oracle.act(trial.actions[time - 1])
+        oracle.observe({z: Fraction(z == look) for z in oracle.Z}, look)
+    weight = [sum(w for (i, _), w in oracle.weights.items() if i == number) for number in (0, 1)]
+    return math.log(weight[0] * 3), math.log(weight[1] * 3 / 2), math.log(sum(weight))
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_small_cases_are_the_sum_over_every_path(seed):
+    rng = np.random.default_rng(seed)
+    trials = [small_trial(rng.integers(4, size=5).tolist(), rng.integers(2, size=4).tolist()) for _ in range(2)]
+    evidence = PlainEvidence(SMALL)
+    evidence.catch_up(trials, ["it", "it"])
+    for column, noise in enumerate([SURE, *UNCERTAIN]):
+        own, fresh, summed = exactly(trials[1], trials[0], noise)
+        assert evidence.own[1, column] == pytest.approx(own, abs=1e-9)
+        assert evidence.fresh[1, column] == pytest.approx(fresh, abs=1e-9)
+        assert evidence.summed[1, column] == pytest.approx(summed, abs=1e-9)
+
+
+@pytest.mark.parametrize("missing", [0.0, 0.3])
+def test_the_evidence_of_all_trials_is_that_of_the_bayes_filter(missing):
+    rng = np.random.default_rng(0)
+    objects = cubes(3)
+    trials = [trial_of(objects[number], 10, rng, missing=missing) for number in (0, 1, 2, 0, 1, 2)]
+    owners = ["0", "1", "2", "0", "1", "2"]
+    evidence, memory = PlainEvidence(ARCUBES), RobotMemory(ARCUBES)
+    evidence.catch_up(trials[:2], owners[:2])
+    evidence.catch_up(trials, owners)
+    for number, (trial, owner) in enumerate(zip(trials, owners, strict=True)):
+        for column in (0, 1, 1 + UNCERTAIN.index(USUAL)):
+            noise = [SURE, *UNCERTAIN][column]
+            filtering = begin_trial("bayes-filter", memory, ModelParameters(*noise))
+            for time, look in enumerate(trial.detections):
+                if time:
+                    filtering.act(trial.actions[time - 1])
+                filtering.observe(Evidence.of_detection(ARCUBES.alphabet, look))
+            # Objects that share next to nothing with a trial are left out of the sum.
+            assert evidence.summed[number, column] == pytest.approx(
+                filtering.log_evidence, abs=0.2 if missing else 0.02
+            )
+        patterns = [Evidence.of_detection(ARCUBES.alphabet, look).pattern for look in trial.detections]
+        memory.learn(patterns, list(trial.actions), owner if owner in memory.names else None)
+        memory.rename(memory.names[-1], owner) if owner not in memory.names else None
+
+
+def uncertain_object(rng, n_states=8, n_successors=2):
+    """An object of which each action leads to one of two states from each state, by chance."""
+    patterns = [ARCUBES.alphabet.patterns[index] for index in rng.permutation(132)[:n_states]]
+    return Object(patterns, rng.integers(n_states, size=(n_states, 3, n_successors)))
+
+
+def uncertain_trial(shown, n_actions, rng):
+    state = int(rng.integers(len(shown.patterns)))
+    looks, actions = [shown.patterns[state]], []
+    for _ in range(n_actions):
+        action = int(rng.integers(3))
+        state = int(rng.choice(np.asarray(shown.successors)[state, action]))
+        actions.append(action)
+        looks.append(shown.patterns[state])
+    return RawTrial(tuple(looks), tuple(actions))
+
+
+def test_where_actions_are_uncertain_that_is_what_the_trials_say():
+    rng = np.random.default_rng(0)
+    unsure, sure = [uncertain_object(rng) for _ in range(3)], cubes(3)
+    trials = [uncertain_trial(unsure[number % 3], 12, rng) for number in range(9)]
+    trials += [trial_of(sure[number % 3], 12, rng) for number in range(9)]
+    evidence = PlainEvidence(ARCUBES)
+    # Filed as objects of their own, as a robot does that does not yet know that actions are uncertain.
+    evidence.catch_up(trials, list(map(str, range(18))))
+    table = evidence.of_kinds(USUAL)
+    uncertain, gain = table[:9].sum(axis=0), table[9:].sum(axis=0) @ (1, -1)
+    assert uncertain[1] > uncertain[0] + 50
+    assert gain > 5
+    # As one of either kind a trial is as probable as one of an object never met.
+    assert np.logaddexp(*table.T) == pytest.approx(np.logaddexp(*evidence.fresh[:, [0, 13]].T))
+    assert evidence.best_noise(np.repeat([1.0, 0.0], 9)).concentration >= 0.3
+
+
+def test_noise_is_what_explains_most():
+    rng = np.random.default_rng(1)
+    unsure = uncertain_object(rng, n_states=4, n_successors=4)
+    evidence = PlainEvidence(ARCUBES)
+    evidence.catch_up([uncertain_trial(unsure, 12, rng) for _ in range(8)], ["it"] * 8)
+    best = evidence.best_noise(np.ones(8))
+    totals = dict(zip(itertools.chain([SURE], UNCERTAIN), evidence.summed.sum(axis=0).tolist(), strict=True))
+    assert totals[best] > max(totals[SURE] + 50, totals[UNCERTAIN[0]])
+
+
+def test_looks_at_nothing_say_nothing():
+    evidence = PlainEvidence(ARCUBES)
+    evidence.catch_up([RawTrial(((None, None), (None, None)), (0,))], ["it"])
+    assert evidence.fresh == pytest.approx(0.0)
