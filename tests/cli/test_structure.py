@@ -1,5 +1,6 @@
 import json
 
+import numpy as np
 import pytest
 
 from atg_fg.core.assumptions import arcube_assumptions
@@ -7,6 +8,7 @@ from atg_fg.core.memory import RobotMemory
 from atg_fg.learning.structured_memory import StructuredMemory
 from atg_fg.storage import memory_files
 from tests.learning.boxes import INSIDE, box_memory
+from tests.learning.worlds import uncertain_object, uncertain_trial
 
 
 @pytest.fixture(scope="module")
@@ -80,3 +82,24 @@ def test_what_is_not_there_is_refused(run, refused, file, tmp_path):
     memory.learn([0], [], None)
     memory_files.save_memory(memory, plain)
     assert "--completed" in refused("memory", "export", plain, "--completed")
+
+
+def test_objects_whose_actions_are_uncertain_are_shown_and_kept(run, refused, tmp_path):
+    memory, rng = StructuredMemory(arcube_assumptions()), np.random.default_rng(0)
+    objects = [uncertain_object(rng) for _ in range(3)]
+    for number in range(12):
+        trial = uncertain_trial(objects[number % 3], 10, rng)
+        patterns = [memory.assumptions.alphabet.index(look) for look in trial.detections]
+        name = memory.learn(patterns, list(trial.actions), None)
+        memory.learn_shared(name, trial.detections, trial.actions)
+    for file in (tmp_path / "memory.json", tmp_path / "memory.db"):
+        memory_files.save_memory(memory, file)
+        assert memory_files.load_memory(file) == memory
+        status, output, _ = run("memory", "structure", file)
+        assert status == 0
+        assert f"uncertain actions, α = {memory.learner.noise.concentration:g}" in output
+        document = json.loads(run("memory", "structure", file, "--json", "-")[1])
+        assert document["structures"] == []
+        assert document["uncertain"]["concentration"] == memory.learner.noise.concentration
+        assert len(document["uncertain"]["members"]) > 8
+    assert "uncertain actions" in refused("memory", "structure", file, "--plot", tmp_path / "structure.svg")

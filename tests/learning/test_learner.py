@@ -7,6 +7,7 @@ import pytest
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.learning.learner import N_DRAWS, StructureLearner
 from atg_fg.learning.milestones import is_milestone
+from atg_fg.learning.plain_evidence import USUAL
 from atg_fg.learning.rates import Rates
 from atg_fg.storage.structure_json import read_learner, write_learner
 from atg_fg.worlds.families import hexagonal_prisms
@@ -22,6 +23,8 @@ from tests.learning.worlds import (
     prisms,
     random_objects,
     trial_of,
+    uncertain_object,
+    uncertain_trial,
 )
 
 
@@ -202,3 +205,45 @@ def test_a_structure_that_is_nearly_right_is_not_believed_beside_the_right_one()
     (best,) = learner.believed(["0"])
     assert best.structure == PRISM
     assert best.weight > 0.99
+
+
+@pytest.fixture(scope="module")
+def unsure():
+    """A learner of 3 cubes and of 3 objects whose actions are uncertain, which it took for another one each time."""
+    rng = np.random.default_rng(0)
+    known, others = cubes(3), [uncertain_object(rng) for _ in range(3)]
+    learner = StructureLearner(ARCUBES)
+    for number in range(12):
+        learner.learn(f"cube {number % 3}", trial_of(known[number % 3], 10, rng))
+        learner.learn(f"other {number}", uncertain_trial(others[number % 3], 10, rng))
+    return learner
+
+
+def test_objects_whose_actions_are_uncertain_are_a_kind_of_their_own(unsure):
+    names = [f"cube {number}" for number in range(3)] + [f"other {number}" for number in range(12)]
+    uncertain = unsure.uncertain(names)
+    (cube,) = unsure.believed(names)
+    assert cube.structure == CUBE
+    assert (uncertain.members[:3] < 0.01).all()
+    assert (uncertain.members[3:] > 0.5).mean() > 0.8
+    assert uncertain.share > 0.3
+    assert uncertain.noise.concentration >= 0.3
+
+
+def test_of_an_object_without_a_trial_its_kind_is_as_of_any_plain_one(unsure):
+    uncertain = unsure.uncertain(["nobody"])
+    assert uncertain.share < uncertain.members[0] < 1.0
+    assert StructureLearner(ARCUBES).uncertain([]) is None
+
+
+def test_uncertain_actions_are_the_same_after_they_were_kept(unsure):
+    document = json.loads(json.dumps(write_learner(unsure)))
+    assert document["uncertain"] == unsure.noise._asdict() if unsure.noise != USUAL else "uncertain" not in document
+    document["uncertain"] = {"concentration": 0.6, "noise": 0.001}
+    names = list(dict.fromkeys(unsure.owners))
+    twin = read_learner(document, ARCUBES, names, "memory")
+    assert tuple(twin.noise) == (0.6, 0.001)
+    assert not twin.same_as(unsure)
+    for wrong in ({"concentration": 7.0, "noise": 0.001}, {"concentration": -1.0, "noise": 0.0}, {"noise": 0.001}, 3):
+        with pytest.raises(InvalidInputError, match=r"memory\.uncertain"):
+            read_learner({**document, "uncertain": wrong}, ARCUBES, names, "memory")

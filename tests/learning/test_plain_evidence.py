@@ -15,7 +15,7 @@ from atg_fg.core.patterns import Evidence, PatternAlphabet
 from atg_fg.engines import begin_trial
 from atg_fg.learning.plain_evidence import SURE, UNCERTAIN, USUAL, PlainEvidence
 from atg_fg.learning.raw_trials import RawTrial
-from tests.learning.worlds import ARCUBES, Object, cubes, trial_of
+from tests.learning.worlds import ARCUBES, cubes, trial_of, uncertain_object, uncertain_trial
 from tests.oracle import Atg, Oracle
 
 SMALL = Assumptions(3, 3, ("turn", "tip"), PatternAlphabet(("front",), 4))
@@ -87,23 +87,6 @@ def test_the_evidence_of_all_trials_is_that_of_the_bayes_filter(missing):
         patterns = [Evidence.of_detection(ARCUBES.alphabet, look).pattern for look in trial.detections]
         memory.learn(patterns, list(trial.actions), owner if owner in memory.names else None)
         memory.rename(memory.names[-1], owner) if owner not in memory.names else None
-
-
-def uncertain_object(rng, n_states=8, n_successors=2):
-    """An object of which each action leads to one of two states from each state, by chance."""
-    patterns = [ARCUBES.alphabet.patterns[index] for index in rng.permutation(132)[:n_states]]
-    return Object(patterns, rng.integers(n_states, size=(n_states, 3, n_successors)))
-
-
-def uncertain_trial(shown, n_actions, rng):
-    state = int(rng.integers(len(shown.patterns)))
-    looks, actions = [shown.patterns[state]], []
-    for _ in range(n_actions):
-        action = int(rng.integers(3))
-        state = int(rng.choice(np.asarray(shown.successors)[state, action]))
-        actions.append(action)
-        looks.append(shown.patterns[state])
-    return RawTrial(tuple(looks), tuple(actions))
 
 
 def test_where_actions_are_uncertain_that_is_what_the_trials_say():

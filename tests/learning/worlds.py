@@ -135,3 +135,21 @@ def trial_of(
             state = int(shown.successors[state][actions[-1]])
         detections.append(look())
     return RawTrial(tuple(detections), tuple(actions))
+
+
+def uncertain_object(rng: np.random.Generator, n_states: int = 8, n_successors: int = 2) -> Object:
+    """An object of which each action leads to one of some states from each state, by chance."""
+    patterns = [ARCUBES.alphabet.patterns[index] for index in rng.permutation(132)[:n_states]]
+    return Object(patterns, rng.integers(n_states, size=(n_states, 3, n_successors)))
+
+
+def uncertain_trial(shown: Object, n_actions: int, rng: np.random.Generator) -> RawTrial:
+    """A trial of random actions with an object whose actions are uncertain."""
+    state = int(rng.integers(len(shown.patterns)))
+    looks, actions = [shown.patterns[state]], []
+    for _ in range(n_actions):
+        action = int(rng.integers(3))
+        state = int(rng.choice(np.asarray(shown.successors)[state, action]))
+        actions.append(action)
+        looks.append(shown.patterns[state])
+    return RawTrial(tuple(looks), tuple(actions))
