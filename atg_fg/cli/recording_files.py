@@ -13,8 +13,9 @@ from atg_fg.cli.terminal import say
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.experiments.simulated_recording import simulated_recording
 from atg_fg.storage import plain_files
+from atg_fg.storage.bag_process import read_bag
 from atg_fg.storage.recordings import check_recording, completed, read_recording, write_recording
-from atg_fg.storage.rosbag_recordings import is_bag, read_bag, read_topics
+from atg_fg.storage.rosbag_recordings import is_bag, read_topics
 
 app = typer.Typer(
     help="Check recordings of your own detector, and convert them. Example: atg-fg recordings check looks.csv",

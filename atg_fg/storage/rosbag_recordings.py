@@ -10,6 +10,7 @@ A file of topics says where labels, actions, trials and objects are published, a
 
 from __future__ import annotations
 
+import errno
 import json
 import tempfile
 from collections.abc import Iterator, Mapping
@@ -22,6 +23,7 @@ from atg_fg.core.checks import brief, plain_text
 from atg_fg.core.errors import InvalidInputError, MissingDependencyError
 from atg_fg.core.recordings import RecordedLook, RecordedTrial, Recording, used_labels
 from atg_fg.storage.checked_json import parse_json, read_object
+from atg_fg.storage.limits import refuse_size, unpacked_limit
 from atg_fg.storage.plain_files import read_text_file
 
 #: Looks of one bag, at most.
@@ -85,7 +87,7 @@ def _topic_field(value: Any, place: str) -> TopicField:
 
 
 def read_bag(path: Path, topics: BagTopics) -> Recording:
-    """Return the recording in a bag: a folder of rosbag2, an ``.mcap`` file, or a ``.bag`` of ROS 1.
+    """Return the recording in a bag, read here: ``bag_process.read_bag`` reads what comes from strangers.
 
     Of several messages between two actions the label of the greatest confidence counts, the last one where none is
     stated.
@@ -106,7 +108,7 @@ def read_bag(path: Path, topics: BagTopics) -> Recording:
             folder = stack.enter_context(_folder_of(path)) if path.suffix == ".mcap" else path
             reader = stack.enter_context(AnyReader([folder], default_typestore=get_typestore(Stores.LATEST)))
         except Exception as error:  # whatever the library makes of what is no bag
-            raise _unreadable(path, error) from error
+            raise unreadable(path, error) from error
         trials = _Trials(path, topics)
         for number, (topic, message) in enumerate(_messages(reader, path, topics)):
             trials.take(topic, message, f"{path}: message {number} of {topic}")
@@ -145,7 +147,16 @@ def _folder_of(path: Path) -> Iterator[Path]:
         yield Path(name)
 
 
-def _unreadable(path: Path, error: Exception) -> InvalidInputError:
+def size_of(path: Path) -> int:
+    """Return how many bytes there are in a bag: a file, or the files of a folder."""
+    found = [path, *(path.iterdir() if path.is_dir() else ())]
+    return sum(each.stat().st_size for each in found if each.is_file())
+
+
+def unreadable(path: Path, error: Exception) -> InvalidInputError:
+    """Return the error about a bag that its library cannot read."""
+    if isinstance(error, MemoryError) or (isinstance(error, OSError) and error.errno == errno.EFBIG):
+        return refuse_size(path, unpacked_limit(size_of(path)))
     reason = (error.strerror if isinstance(error, OSError) else None) or str(error) or type(error).__name__
     return InvalidInputError(
         f"{path}: cannot be read: {' '.join(reason.split()):.200}; "
@@ -173,7 +184,7 @@ def _messages(reader: Any, path: Path, topics: BagTopics) -> Iterator[tuple[str,
         except StopIteration:
             return
         except Exception as error:  # whatever the library makes of damaged data
-            raise _unreadable(path, error) from error
+            raise unreadable(path, error) from error
         yield connection.topic, message
 
 

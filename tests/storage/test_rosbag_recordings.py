@@ -1,6 +1,10 @@
 """Bags of ROS as recordings: written here with the library that reads them."""
 
 import json
+import resource
+import sqlite3
+import sys
+from contextlib import closing
 
 import numpy as np
 import pytest
@@ -11,7 +15,8 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.storage.rosbag_recordings import is_bag, read_bag, read_topics
+from atg_fg.storage.bag_process import read_bag
+from atg_fg.storage.rosbag_recordings import is_bag, read_topics
 
 TYPES = {
     "vision_msgs/msg/ObjectHypothesis": "string class_id\nfloat64 score",
@@ -235,3 +240,67 @@ def test_a_file_that_is_no_mcap_is_one_line(topics, tmp_path):
 def test_a_file_of_topics_is_checked(topics, fields, message):
     with pytest.raises(InvalidInputError, match=message):
         topics(**fields)
+
+
+class TestBombs:
+    """Small bags that would unfold to gigabytes, or be read for ever."""
+
+    @pytest.fixture
+    def plain(self, bag, text):
+        return bag([text("/seen", "logo"), text("/did", "turn"), text("/seen", "lid")])
+
+    @staticmethod
+    def say(folder, *lines):
+        """Say more of a bag in its metadata."""
+        meta = folder / "metadata.yaml"
+        kept = [line for line in meta.read_text().split("\n") if "compression" not in line]
+        meta.write_text("\n".join([kept[0], *(f"  {line}" for line in lines), *kept[1:]]))
+
+    @staticmethod
+    def zeros(n_bytes):
+        from rosbags.rosbag2.reader import zstd
+
+        packer = zstd.ZstdCompressor()
+        part = bytes(2**24)
+        return b"".join(packer.compress(part) for _ in range(n_bytes // 2**24)) + packer.flush()
+
+    def refused(self, folder, topics):
+        begun = resource.getrusage(resource.RUSAGE_CHILDREN)
+        with pytest.raises(InvalidInputError) as error:
+            read_bag(folder, topics(slots={"label": LABEL}, action=DID))
+        ended = resource.getrusage(resource.RUSAGE_CHILDREN)
+        assert "\n" not in str(error.value)
+        return str(error.value), ended.ru_utime - begun.ru_utime
+
+    def test_a_file_that_is_packed_does_not_fill_the_disk(self, plain, topics):
+        file = next(plain.glob("*.db3"))
+        self.say(plain, "compression_mode: FILE", "compression_format: zstd")
+        file.write_bytes(self.zeros(2**31))
+        message, seconds = self.refused(plain, topics)
+        assert "holds more than 67,108,864 bytes" in message
+        assert seconds < 5
+
+    def test_a_message_that_is_packed_does_not_fill_the_memory(self, plain, topics):
+        self.say(plain, "compression_mode: MESSAGE", "compression_format: zstd")
+        with closing(sqlite3.connect(next(plain.glob("*.db3")))) as database, database:
+            database.execute("UPDATE messages SET data = ?", (self.zeros(2**32),))
+        message, seconds = self.refused(plain, topics)
+        assert "holds more than 67,108,864 bytes" in message
+        assert seconds < 10
+
+    @pytest.mark.parametrize(("signal", "said"), [("KILL", "takes longer than its size"), ("SEGV", "status -11")])
+    def test_a_reader_that_is_ended_is_one_line(self, signal, said, plain, topics, tmp_path, monkeypatch):
+        """By the limit of its processor time, or by a fault of the library."""
+        stub = tmp_path / "python"
+        stub.write_text(f"#!/bin/sh\nkill -{signal} $$\n")
+        stub.chmod(0o755)
+        monkeypatch.setattr(sys, "executable", str(stub))
+        assert said in self.refused(plain, topics)[0]
+
+    def test_a_bag_whose_table_is_a_view_without_end_is_none(self, plain, topics):
+        with closing(sqlite3.connect(next(plain.glob("*.db3")))) as database, database:
+            database.execute("ALTER TABLE messages RENAME TO real")
+            database.execute(
+                "CREATE VIEW messages AS WITH n(id) AS (SELECT 1 UNION ALL SELECT id FROM n) SELECT * FROM n"
+            )
+        assert "cannot be read" in self.refused(plain, topics)[0]

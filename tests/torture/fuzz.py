@@ -25,8 +25,8 @@ CORPUS = Path(__file__).parent / "corpus"
 KINDS = (
     *("memory", "structured memory", "compact memory", "script", "UAI model", "UAI evidence", "database", "test log"),
     *("trial record", "goal run", "result", "ablation log", "preset", "counts", "tags", "calibration", "URDF"),
-    *("recorded table", "recorded lines", "recording spec", "bag topics", "MCAP bag", "SQLite bag", "bag metadata"),
-    *("bag of ROS 1", "mapping"),
+    *("recorded table", "recorded lines", "recording spec", "bag topics", "MCAP bag", "SQLite bag", "bag of ROS 1"),
+    *("mapping",),
 )
 #: Longer inputs are not made.
 _MAX_BYTES = 20_000

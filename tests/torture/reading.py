@@ -45,7 +45,8 @@ from atg_fg.report.page import page
 from atg_fg.report.reading import read_report
 from atg_fg.senses.tags import TagDetector, Tags
 from atg_fg.senses.video import read_image
-from atg_fg.storage import memory_files, memory_json, plain_files
+from atg_fg.storage import memory_files, memory_json, plain_files, rosbag_recordings
+from atg_fg.storage.bag_process import read_bag
 from atg_fg.storage.camera_files import read_calibration, read_tags
 from atg_fg.storage.database.checking import faults_of_database
 from atg_fg.storage.database.connection import writing
@@ -56,7 +57,7 @@ from atg_fg.storage.memory_files import open_memory
 from atg_fg.storage.presets import preset
 from atg_fg.storage.recorded_test import recorded_tests
 from atg_fg.storage.recordings import check_recording, read_recording, read_spec, write_recording
-from atg_fg.storage.rosbag_recordings import read_bag, read_topics
+from atg_fg.storage.rosbag_recordings import read_topics
 from atg_fg.storage.scripted_trial import read_script
 from atg_fg.storage.trial_log import TrialLog
 from atg_fg.storage.uai import read_evidence, read_model
@@ -295,17 +296,18 @@ def _said(recording: Recording) -> list[Any]:
 
 
 def _read_bag(path: Path) -> None:
-    _written_again(read_bag(path, BAG_TOPICS), path)
+    """Read a bag in this process, so that damage to it does not cost a process each."""
+    _written_again(rosbag_recordings.read_bag(path, BAG_TOPICS), path)
 
 
-def _read_sqlite_bag(content: str, path: Path) -> None:
+def _read_sqlite_bag(content: str, read: Callable[[Path], None], path: Path) -> None:
     """Read a bag of rosbag2 of which one file, whose suffix is ``content``, is damaged."""
     folder = path.with_name("bag")
     shutil.copytree(_sound_bag(), folder)
     (there,) = folder.glob(f"*{content}")
     path.replace(there)
     try:
-        _read_bag(folder)
+        read(folder)
     finally:
         shutil.rmtree(folder)
 
@@ -351,8 +353,9 @@ READERS: Final[dict[str, Callable[[Path], None]]] = {
     "bag topics": lambda path: read_topics(path) and None,
     "MCAP bag": _read_bag,
     "bag of ROS 1": _read_bag,
-    "SQLite bag": partial(_read_sqlite_bag, ".db3"),
-    "bag metadata": partial(_read_sqlite_bag, ".yaml"),
+    "SQLite bag": partial(_read_sqlite_bag, ".db3", _read_bag),
+    # A few lines of YAML can take seconds.
+    "bag metadata": partial(_read_sqlite_bag, ".yaml", lambda folder: read_bag(folder, BAG_TOPICS) and None),
 }
 SUFFIXES: Final = {
     "compact memory": ".npz",
