@@ -20,7 +20,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from atg_fg.core.checks import brief, plain_text
-from atg_fg.core.errors import InvalidInputError, MissingDependencyError
+from atg_fg.core.errors import AtgError, InvalidInputError, MissingDependencyError
 from atg_fg.core.recordings import RecordedLook, RecordedTrial, Recording, used_labels
 from atg_fg.storage.checked_json import parse_json, read_object
 from atg_fg.storage.limits import refuse_size, unpacked_limit
@@ -153,7 +153,7 @@ def size_of(path: Path) -> int:
     return sum(each.stat().st_size for each in found if each.is_file())
 
 
-def unreadable(path: Path, error: Exception) -> InvalidInputError:
+def unreadable(path: Path, error: Exception) -> AtgError:
     """Return the error about a bag that its library cannot read."""
     if isinstance(error, MemoryError) or (isinstance(error, OSError) and error.errno == errno.EFBIG):
         return refuse_size(path, unpacked_limit(size_of(path)))
