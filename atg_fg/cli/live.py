@@ -126,6 +126,7 @@ def live(
         raise InvalidInputError("live: no tags; expected --tags FILE, as print cube wrote it, or --dictionary NAME")
     from atg_fg.cli.live_teller import LiveTeller
     from atg_fg.experiments.live_session import LiveSession
+    from atg_fg.experiments.recognition_agent import RecognitionAgent
     from atg_fg.senses.tags import TagDetector
     from atg_fg.senses.turns import Patience, TurnWatcher
     from atg_fg.senses.video import FrameSource
@@ -144,21 +145,13 @@ def live(
         remembered = stack.enter_context(memory_for(parameters, kept))
         remembered.begin_experiment("live", about, seed)
 
+        agent = RecognitionAgent(remembered, parameters, engine=chosen, policy=chosen_policy, seed=seed)
+
         def begin(frame: Frame) -> LiveSession:
             size = (frame.image.shape[1], frame.image.shape[0])
             detector = TagDetector(known.seen_by(lens_of(calibration, field_of_view, size, frames.place)))
             watcher = TurnWatcher(ACTION_ROTATIONS, viewpoint, patience)
-            return LiveSession(
-                detector,
-                watcher,
-                remembered,
-                parameters,
-                chosen_policy,
-                engine=chosen,
-                seed=seed,
-                learns=learn,
-                asks=asks,
-            )
+            return LiveSession(detector, watcher, agent, learns=learn, asks=asks)
 
         def keep(session: LiveSession, record: TrialRecord, learned: str | None) -> None:
             if memory is not None and learned is not None:

@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
-from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.records import TrialRecord, TrialStep
 from atg_fg.experiments.live_trial import LiveTrial
+from atg_fg.experiments.recognition_agent import RecognitionAgent
 from atg_fg.experiments.trial import learn_from
-from atg_fg.policies import ExplorationPolicy, Policy
+from atg_fg.policies import ExplorationPolicy
 from atg_fg.senses.tag_drawing import draw_slots
 from atg_fg.senses.tags import DetectedTag, TagDetector
 from atg_fg.senses.turns import CubeAtRest, CubeTakenAway, TurnWatcher
@@ -71,11 +71,7 @@ class LiveSession:
     Args:
         detector: Reads the tags.
         watcher: Notices how the cube is turned.
-        memory: Learns from trials.
-        parameters: α, δ and whether to learn within a trial.
-        policy: Proposes actions.
-        engine: Name of the inference engine.
-        seed: Of the generators of all trials, from which ties are broken.
+        agent: Recognises cubes and proposes actions; its memory learns from trials.
         learns: Whether every trial is learned from; else those are for which ``learn`` is set. Then actions that were
             never tried are proposed when the verdict is settled.
         asks: Whether there is someone to ask how the cube was turned; if not, the trial ends where it is not known.
@@ -94,20 +90,15 @@ class LiveSession:
         self,
         detector: TagDetector,
         watcher: TurnWatcher,
-        memory: RobotMemory,
-        parameters: ModelParameters,
-        policy: Policy,
+        agent: RecognitionAgent,
         *,
-        engine: str = "bayes-filter",
-        seed: int = 0,
         learns: bool = False,
         asks: bool = False,
     ) -> None:
-        _check_memory(memory, watcher.actions, len(detector.tags.all_symbols))
-        self.memory, self.learns, self.learn = memory, learns, False
-        self._detector, self._watcher = detector, watcher
-        self._parameters, self._policy, self._engine, self._asks = parameters, policy, engine, asks
-        self._seeds = np.random.SeedSequence(seed)
+        _check_memory(agent.memory, watcher.actions, len(detector.tags.all_symbols))
+        self.memory, self.learns, self.learn = agent.memory, learns, False
+        self._detector, self._watcher, self._agent, self._asks = detector, watcher, agent, asks
+        self._at_rest: dict[str, DetectedTag | None] = {}
         self._trial: LiveTrial | None = None
         self._unanswered: CubeAtRest | None = None
         self._noted: set[str] = set()
@@ -178,15 +169,20 @@ class LiveSession:
             yield Noted("it was not seen how the cube was turned: the trial ends here, and another begins")
             yield from self.end()
         if self._trial is None:
-            rng = np.random.default_rng(self._seeds.spawn(1)[0])
-            teaching = ExplorationPolicy() if self.learns else None
-            self._trial = LiveTrial(self.memory, self._parameters, self._engine, self._policy, rng, teaching)
-            turn = ()
+            self._trial, self._at_rest, turn = (
+                LiveTrial(self._agent, ExplorationPolicy() if self.learns else None),
+                {},
+                (),
+            )
         elif turn:
             self._trial.acted([self.memory.assumptions.action_index(name) for name in turn])
-        else:
-            return  # it stands as it stood
-        evidence = self._detector.evidence(self.memory.assumptions.alphabet, rest.slots)
+            self._at_rest = {}
+        before = self._at_rest
+        # It stands as it stood: what was hidden then may be seen now.
+        self._at_rest = {slot: tag or before.get(slot) for slot, tag in rest.slots.items()}
+        if before and all(tag is None or before[slot] is not None for slot, tag in rest.slots.items()):
+            return
+        evidence = self._detector.evidence(self.memory.assumptions.alphabet, self._at_rest)
         yield Looked(turn or (), self._trial.look(evidence))
 
     def _note_oddities(self, tags: Sequence[DetectedTag]) -> Iterator[Noted]:

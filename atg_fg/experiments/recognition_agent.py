@@ -23,7 +23,7 @@ from atg_fg.core.records import Verdict
 from atg_fg.engines import begin_trial, engine_for
 from atg_fg.experiments.learned_history import learn_history
 from atg_fg.inference.interface import Inference
-from atg_fg.policies import Policy, make_policy
+from atg_fg.policies import Choice, Policy, make_policy
 from atg_fg.worlds.base import detection_of
 
 
@@ -191,12 +191,20 @@ class RecognitionAgent:
         Raises:
             InvalidInputError: Nothing was seen since the last action.
         """
-        choice = self.policy.choose(self.inference, self._generators[0])
+        choice = self.choice()
         expected = choice.expected_entropies
         if choice.action is None:
             return Proposal(None, None, choice.purpose)
         entropy = None if expected is None else float(expected[choice.action])
         return Proposal(self.memory.assumptions.actions[choice.action], entropy, choice.purpose)
+
+    def choice(self, policy: Policy | None = None) -> Choice:
+        """Return what the policy, or another one, chooses in the present trial; ties are broken by its generator.
+
+        Raises:
+            InvalidInputError: Nothing was seen since the last action.
+        """
+        return (policy or self.policy).choose(self.inference, self._generators[0])
 
     def did(self, action: GivenAction) -> None:
         """Take in what was done, whatever had been proposed: see ``Inference.act``.

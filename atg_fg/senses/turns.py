@@ -46,8 +46,8 @@ class CubeAtRest:
 
     Attributes:
         slots: The tag in front and the tag on top, ``None`` where none is seen.
-        turn: The actions that turned it since it stood last, in order; none at its first rest; ``None`` if it was
-            turned but it is not known how.
+        turn: The actions that turned it since it stood last, in order; none at its first rest, and where it stands as
+            it stood but shows a tag that was hidden then; ``None`` if it was turned but it is not known how.
     """
 
     slots: Mapping[str, DetectedTag | None]
@@ -119,6 +119,7 @@ class TurnWatcher:
         self._turned: FloatArray | None = None
         self._stood: int | None = None
         self._reported = False
+        self._hidden: set[str] = set()  # slots in which nothing was seen as it stands
 
     def take(self, time: float, tags: Sequence[DetectedTag]) -> CubeAtRest | CubeTakenAway | None:
         """Take in the tags of a frame; say what has happened, if anything has.
@@ -142,7 +143,7 @@ class TurnWatcher:
         if moved:
             self._still_since, self._reported = time, False
         self._note_places(believed)
-        return None if self._reported else self._at_rest(time, believed)
+        return None if self._reported and not self._hidden else self._at_rest(time, believed)
 
     def forget_cube(self) -> None:
         """Take what is seen next for another cube."""
@@ -181,16 +182,17 @@ class TurnWatcher:
             # None of its tags was seen before: it was turned unseen, or it is another cube.
             self._on_cube = {}
             self._note_places(tags)
-            self._reported, self._stood = True, self._standing(tags)
+            self._reported, self._stood, self._hidden = True, self._standing(tags), _empty(slots)
             return CubeAtRest(slots, None)
         if stands is None or all(tag is None for tag in slots.values()):
             return None
         turn: tuple[str, ...] | None = ()
         if self._stood is not None:
             turn = self._sequences.get(_composed(stands, self._stood))
-        again = self._stood is not None and turn == ()
-        self._reported, self._stood = True, stands
-        return None if again else CubeAtRest(slots, turn)
+        hidden = self._hidden & _empty(slots) if self._stood is not None and turn == () else None
+        shows_nothing_new = hidden == self._hidden
+        self._reported, self._stood, self._hidden = True, stands, _empty(slots) if hidden is None else hidden
+        return None if shows_nothing_new else CubeAtRest(slots, turn)
 
     def _straightened(self, tag: DetectedTag) -> DetectedTag:
         """Return the tag in that of its poses, if both are likely, in which it faces straight to a side or up."""
@@ -248,6 +250,10 @@ class TurnWatcher:
             return None
         off, stands = _straight(self.viewpoint.axes @ cube)
         return stands if off < self.patience.skew else None
+
+
+def _empty(slots: Mapping[str, DetectedTag | None]) -> set[str]:
+    return {slot for slot, tag in slots.items() if tag is None}
 
 
 def _ambiguity(tag: DetectedTag) -> float:

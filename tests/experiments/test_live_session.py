@@ -8,6 +8,7 @@ from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.patterns import PatternAlphabet
 from atg_fg.experiments.live_session import Asked, Ended, LiveSession, Looked, Noted
+from atg_fg.experiments.recognition_agent import RecognitionAgent
 from atg_fg.policies import make_policy
 from atg_fg.senses.tags import TagDetector, Tags
 from atg_fg.senses.turns import Patience, TurnWatcher
@@ -25,7 +26,8 @@ def begin(memory=None, **options):
     detector = TagDetector(Tags("5X5_50", 0.042, INTRINSICS, symbols={tag: tag for tag in range(12)}))
     watcher = TurnWatcher(ACTION_ROTATIONS, patience=Patience.of_pictures())
     memory = RobotMemory(arcube_assumptions()) if memory is None else memory
-    return LiveSession(detector, watcher, memory, preset("default"), make_policy("entropy", 0.05), **options)
+    agent = RecognitionAgent(memory, preset("default"), policy=make_policy("entropy", 0.05))
+    return LiveSession(detector, watcher, agent, **options)
 
 
 def feed(session, *pictures):
@@ -42,6 +44,30 @@ def test_frames_become_looks_and_an_empty_table_ends_the_trial():
     assert min(events[1].step.confidences) > 0.99
     assert events[2].learned == "object-000"
     assert session.trial is None
+
+
+def test_what_was_hidden_at_rest_is_a_look_more_at_the_same_aspect():
+    """A hand hides the front, then nothing, then the top: one look on record, of both tags."""
+    session = begin(learns=True)
+    whole = cube_picture(FACES, np.eye(3))
+    detected = session._detector.detect(whole)
+    slots = session._watcher.viewpoint.slots(detected)
+    hidden = {}
+    for slot, tag in slots.items():
+        hidden[slot] = whole.copy()
+        x, y = np.split(tag.corners.astype(int), 2, axis=1)
+        hidden[slot][y.min() - 5 : y.max() + 5, x.min() - 5 : x.max() + 5] = 120
+    events = feed(session, hidden["front"], whole, hidden["top"], whole, cube_picture(FACES, LEFT), BLANK)
+    assert [type(event) for event in events] == [Looked, Looked, Looked, Ended]
+    assert [event.turn for event in events[:-1]] == [(), (), ("left",)]
+    assert events[0].step.detection[0] is None
+    assert events[1].step.belief.entropy <= events[0].step.belief.entropy
+    record = events[-1].record
+    whole_look = events[1].step.detection
+    assert None not in whole_look
+    assert record.detections == [whole_look, (2, 4)]
+    assert record.actions == [1]
+    assert events[-1].learned == "object-000"
 
 
 def test_a_trial_is_learned_from_only_if_that_is_wanted():

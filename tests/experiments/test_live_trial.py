@@ -7,6 +7,7 @@ from atg_fg.core.memory import RobotMemory
 from atg_fg.core.patterns import Evidence
 from atg_fg.engines import begin_trial
 from atg_fg.experiments.live_trial import LiveTrial
+from atg_fg.experiments.recognition_agent import RecognitionAgent
 from atg_fg.policies import ExplorationPolicy, make_policy
 from atg_fg.storage.presets import preset
 
@@ -24,9 +25,8 @@ def memory():
 
 
 def live(memory, settled=None, teaching=None, engine="bayes-filter"):
-    return LiveTrial(
-        memory, preset("default"), engine, make_policy("entropy", settled), np.random.default_rng(0), teaching
-    )
+    agent = RecognitionAgent(memory, preset("default"), engine=engine, policy=make_policy("entropy", settled))
+    return LiveTrial(agent, teaching)
 
 
 def look(trial, detection):
@@ -62,6 +62,18 @@ def test_actions_done_at_once_are_actions_with_nothing_seen_between(memory):
     record = trial.ended()
     assert record.detections == [SEEN[0], (None, None), SEEN[2]]
     assert record.actions == TURNS[:2]
+
+
+def test_of_looks_at_rest_the_one_that_says_most_counts_alone(memory):
+    trial, plain = live(memory), begin_trial("enumeration", memory, preset("default"))
+    for seen in ((None, 4), SEEN[0], (0, None)):
+        step = look(trial, seen)
+    plain.observe(Evidence.of_detection(ALPHABET, SEEN[0]))
+    np.testing.assert_allclose(step.belief.objects, plain.identity().objects)
+    trial.acted([TURNS[0]])
+    look(trial, SEEN[1])
+    assert trial.ended().detections == [SEEN[0], SEEN[1]]
+    assert trial.record.actions == [TURNS[0]]
 
 
 def test_the_last_proposal_is_no_action(memory):
