@@ -17,6 +17,7 @@ from atg_fg.core.errors import ImpossibleEvidenceError, InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, FloatArray, PatternAlphabet
+from atg_fg.core.promises import require
 from atg_fg.engines import begin_trial, engine_for
 from atg_fg.inference.interface import Inference
 
@@ -83,7 +84,7 @@ def check_engine(
     found = engine_for(engine)
     for attribute, kind in (("name", str), ("exact", bool), ("knows_structure", bool)):
         value = getattr(found, attribute, None)
-        _require(isinstance(value, kind), f"{attribute} is {value!r}; expected a {kind.__name__}")
+        require(isinstance(value, kind), f"{attribute} is {value!r}; expected a {kind.__name__}")
     worst = Deviation()
     for number in range(cases):
         case = _drawn_case(number, np.random.default_rng((seed, number)), sure=not found.takes_uncertain_actions)
@@ -109,16 +110,16 @@ def _compared(
         for inference in (tried, again, exact):
             inference.observe(evidence)
         numbers = _answers(tried)
-        _require(_same(numbers, _answers(again)), f"{place}: the same trial gave other numbers; expected the same")
+        require(_same(numbers, _answers(again)), f"{place}: the same trial gave other numbers; expected the same")
         deviation = _deviation(numbers, _answers(exact))
         _check_distributions(tried, place)
         if engine.exact:
             for name, value in deviation.items():
-                _require(value <= tolerance, f"{place}: {name} is off by {value:.3g}; expected at most {tolerance:g}")
+                require(value <= tolerance, f"{place}: {name} is off by {value:.3g}; expected at most {tolerance:g}")
         bound = tried.total_variation_bound
         if bound is not None:
             off = deviation["identity"]
-            _require(off <= bound + tolerance, f"{place}: identity is off by {off:.3g}; its bound is {bound:.3g}")
+            require(off <= bound + tolerance, f"{place}: identity is off by {off:.3g}; its bound is {bound:.3g}")
         logs = deviation["log_evidence"] if engine.exact else 0.0
         worst = Deviation(
             max(worst.identity, deviation["identity"]),
@@ -162,26 +163,26 @@ def _deviation(numbers: dict[str, FloatArray], exact: dict[str, FloatArray]) -> 
 def _check_distributions(inference: Inference, place: str) -> None:
     belief = inference.identity()
     given = np.append(belief.objects, belief.unseen)
-    _require(
+    require(
         given.shape == (inference.model.n_hypotheses,),
         f"{place}: identity of shape {given.shape}; expected {inference.model.n_hypotheses} hypotheses",
     )
     smoothed = inference.smoothed_aspects(belief.most_probable_hypothesis)
-    _require(
+    require(
         len(smoothed) == len(inference.history.evidence),
         f"{place}: smoothed aspects of {len(smoothed)} times; expected {len(inference.history.evidence)}",
     )
     for what, values in (("identity", given), *(("smoothed aspects", each) for each in smoothed)):
         sound = bool((values >= 0).all()) and abs(float(values.sum()) - 1.0) < 1e-6
-        _require(sound, f"{place}: {what} {values}; expected a distribution")
+        require(sound, f"{place}: {what} {values}; expected a distribution")
     entropies = inference.expected_entropies()
-    _require(
+    require(
         entropies.shape == (inference.model.n_actions,) and bool((entropies >= -1e-9).all()),
         f"{place}: expected entropies {entropies}; expected one of at least 0 for each action",
     )
     for name, value in vars(inference).items():
         if isinstance(value, np.ndarray) and not name.startswith("_"):
-            _require(not value.flags.writeable, f"{place}: {name} can be written to; expected a read-only array")
+            require(not value.flags.writeable, f"{place}: {name} can be written to; expected a read-only array")
 
 
 def _check_refusals(inference: Inference, case: _Case) -> None:
@@ -197,7 +198,7 @@ def _check_refusals(inference: Inference, case: _Case) -> None:
     _refused(inference.expected_entropies, f"{place}: expected entropies between an action and its look")
     nothing = Evidence(np.zeros(inference.model.n_patterns))
     _refused(lambda: inference.observe(nothing), f"{place}: a look that no object could give", ImpossibleEvidenceError)
-    _require(len(before["identity"]) == inference.model.n_hypotheses, f"{place}: hypotheses have come or gone")
+    require(len(before["identity"]) == inference.model.n_hypotheses, f"{place}: hypotheses have come or gone")
     inference.observe(Evidence(np.ones(inference.model.n_patterns)))
     _check_distributions(inference, f"{place}, after a look that was refused and one that says nothing")
 
@@ -211,8 +212,8 @@ def _check_copies(begin: Callable[[], Inference], case: _Case) -> None:
     for other in (twin, stored):
         other.act(0)
         other.observe(case.looks[-1])
-    _require(_same(before, _answers(inference)), f"{place}: what was done to a copy has changed the engine")
-    _require(_same(_answers(twin), _answers(stored)), f"{place}: a pickled engine goes on otherwise than a copy")
+    require(_same(before, _answers(inference)), f"{place}: what was done to a copy has changed the engine")
+    require(_same(_answers(twin), _answers(stored)), f"{place}: a pickled engine goes on otherwise than a copy")
 
 
 def _refused(ask: Callable[[], object], what: str, error: type[Exception] = InvalidInputError) -> None:
@@ -223,11 +224,6 @@ def _refused(ask: Callable[[], object], what: str, error: type[Exception] = Inva
     except Exception as other:
         raise AssertionError(f"{what} raised {type(other).__name__}: {other}; expected {error.__name__}") from other
     raise AssertionError(f"{what} was taken; expected {error.__name__}")
-
-
-def _require(holds: bool, message: str) -> None:
-    if not holds:
-        raise AssertionError(message)
 
 
 def _drawn_case(number: int, rng: np.random.Generator, *, sure: bool) -> _Case:

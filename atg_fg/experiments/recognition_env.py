@@ -19,7 +19,7 @@ from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.records import TrialRecord, TrialStep, TrialSummary
 from atg_fg.engines import begin_trial, engine_for
 from atg_fg.experiments.scores import Score
-from atg_fg.experiments.trial import check_world, learn_from, sensed_look
+from atg_fg.experiments.trial import check_world_fits, learn_from, sensed_look
 from atg_fg.inference.interface import Inference
 from atg_fg.learning.structured_memory import memory_for
 from atg_fg.policies.belief_features import BeliefFeatures
@@ -97,7 +97,7 @@ class RecognitionEnv(gymnasium.Env[Summary, np.int64]):
                 f"made_from: {', '.join(self._made_from) or 'nothing'}; expected the object of each of "
                 f"the {len(memory)} ATGs in memory"
             )
-        check_world(world, memory.assumptions, memory.sense)
+        check_world_fits(world, memory.assumptions, memory.sense)
         self.world, self.parameters, self.engine = world, parameters, engine
         self.n_actions, self.reward, self.learns, self.n_trials = n_actions, reward, learns, n_trials
         self.summary = summary or BeliefFeatures(memory.assumptions)

@@ -20,7 +20,7 @@ from atg_fg.worlds.base import World, detection_of, symbols_of
 from atg_fg.worlds.registry import assumptions_of, sense_of
 
 
-def check_world(world: World, assumptions: Assumptions, sense: Sense | None = None) -> None:
+def check_world_fits(world: World, assumptions: Assumptions, sense: Sense | None = None) -> None:
     """Raise ``InvalidInputError`` if a world does not fit what a memory takes for granted.
 
     Args:
@@ -96,7 +96,7 @@ def run_trial(
     assumptions = inference.memory.assumptions
     if n_actions < 1:
         raise InvalidInputError(f"actions: {n_actions}; expected a whole number of at least 1")
-    check_world(world, assumptions, inference.memory.sense)
+    check_world_fits(world, assumptions, inference.memory.sense)
     senses = None if inference.memory.sense is None else inference.memory.sense.begin()
     record = TrialRecord(inference.memory.names, assumptions)
     observation, truth = world.reset(seed=int(rng.integers(2**31)), options=reset_options)

@@ -10,7 +10,7 @@ from atg_fg.core.assumptions import Assumptions, arcube_assumptions
 from atg_fg.core.errors import InvalidInputError, UnknownNameError
 from atg_fg.core.patterns import MISSING, PatternAlphabet
 from atg_fg.experiments.table1 import TestPlan, run_test
-from atg_fg.experiments.trial import check_world
+from atg_fg.experiments.trial import check_world_fits
 from atg_fg.worlds.arcube import make_arcubes
 from atg_fg.worlds.arcube_world import ARcubeWorld
 from atg_fg.worlds.base import symbols_of
@@ -108,7 +108,7 @@ class TestEveryWorld:
         world = make_world_with(name, 8, 1)
         assumptions = assumptions_of(world, 100)
         assert assumptions.n_objects == 8
-        check_world(world, assumptions)
+        check_world_fits(world, assumptions)
 
     def test_objects_are_those_of_the_seed(self, name):
         appearances = [
@@ -214,4 +214,4 @@ class TestAssumptionsOfAWorld:
 
     def test_a_memory_of_another_world_is_refused_though_sizes_are_the_same(self):
         with pytest.raises(InvalidInputError, match="actions swap, turn-left, turn-right; expected those remembered"):
-            check_world(make_world("lock", n_objects=2), arcube_assumptions())
+            check_world_fits(make_world("lock", n_objects=2), arcube_assumptions())

@@ -22,6 +22,7 @@ from atg_fg.storage.presets import preset
 from atg_fg.storage.recorded_header import read_header
 from atg_fg.worlds.arcube import FRONT, ORIENTATIONS, canonical
 from atg_fg.worlds.registry import assumptions_of, make_world_with, sense_of
+from atg_fg.worlds.testing import check_world
 from sim.bodies.pictures import PLAIN, make_picture_boxes
 
 
@@ -45,6 +46,10 @@ def trials(world, memory, n, seed=0):
         learn_from(record, memory)
         records.append(record)
     return records
+
+
+def test_trials_can_be_run_in_it(world):
+    assert check_world(world, trials=1, steps=4) == 5
 
 
 def test_boxes_share_pictures_and_no_two_are_the_same_however_they_are_turned():

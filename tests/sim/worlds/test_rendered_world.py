@@ -12,6 +12,7 @@ from gymnasium.utils.env_checker import check_env
 from atg_fg.core.errors import InvalidInputError, MissingDependencyError, UnknownNameError
 from atg_fg.core.patterns import MISSING
 from atg_fg.worlds.registry import make_world
+from atg_fg.worlds.testing import check_world
 from sim.worlds.rendered_world import RenderedARcubeWorld
 
 NOMINAL = {"position_jitter": 0.02, "yaw_jitter": 5.0, "light_jitter": 0.3, "image_noise": 10.0}
@@ -45,6 +46,7 @@ def episode_hash(seed):
 def test_the_world_keeps_the_gymnasium_contract():
     world = make_world("rendered", render_mode="rgb_array", **NOMINAL)
     check_env(world.unwrapped)
+    assert check_world(world, trials=1) == 21
     world.close()
 
 
