@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterable, Sequence
-from typing import Final, TypeAlias
+from typing import Any, Final, TypeAlias
 
 import networkx
 import numpy as np
@@ -22,6 +23,8 @@ COLLECTION_NODE = "collection"
 #: (source aspect, action, target aspect), all by index.
 Edge: TypeAlias = tuple[int, int, int]
 
+_revisions: Final = itertools.count()
+
 
 class AspectTransitionGraph:
     """What is known of one object: aspects with their patterns, and counted transitions between them.
@@ -31,6 +34,7 @@ class AspectTransitionGraph:
     Attributes:
         name: The object's name, unique in a memory.
         assumptions: What is taken for granted of every object.
+        revision: A number that is another one after each change; graphs of one revision, as a copy, know the same.
     """
 
     def __init__(self, name: str, assumptions: Assumptions) -> None:
@@ -41,6 +45,7 @@ class AspectTransitionGraph:
         self._aspect_of: dict[int, int] = {}
         self._counts: dict[Edge, int] = {}
         self._count_table: IntArray | None = None
+        self.revision = next(_revisions)
 
     @property
     def n_known(self) -> int:
@@ -100,6 +105,7 @@ class AspectTransitionGraph:
                 f"{self.name}: {self.n_known + 1} aspects; expected at most n_aspects = {self.assumptions.n_aspects}"
             )
         self._aspect_of[index] = self.n_known
+        self.revision = next(_revisions)
         return self.n_known - 1
 
     def add_transition(self, source: int, action: int, target: int, count: int = 1) -> None:
@@ -121,6 +127,7 @@ class AspectTransitionGraph:
             raise InvalidInputError(f"{self.name}: count {total}; expected a sum of at most 2^53")
         self._counts[edge] = total
         self._count_table = None
+        self.revision = next(_revisions)
 
     def _check_action(self, action: int) -> None:
         whole_number(action, f"{self.name}: action", 0, len(self.assumptions.actions) - 1)
@@ -210,8 +217,13 @@ class AspectTransitionGraph:
         """Return a graph that can be extended without touching this one."""
         twin = AspectTransitionGraph(self.name, self.assumptions)
         twin._aspect_of = dict(self._aspect_of)
-        twin._counts = dict(self._counts)
+        twin._counts, twin._count_table = dict(self._counts), self._count_table
+        twin.revision = self.revision
         return twin
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        # It may come from another process, which counts by itself.
+        vars(self).update(state, revision=next(_revisions))
 
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, AspectTransitionGraph):

@@ -62,14 +62,12 @@ class BayesFilter(FilterInference):
         if self._compiled is None:
             super().update(evidence)
             return
-        log_probability = self._compiled.look(evidence.likelihood)
+        seen = self.history.step(len(self.history.evidence) - 1)
+        log_probability = self._compiled.look(evidence.likelihood, seen)
         if not math.isfinite(log_probability):
             raise self.impossible_evidence()
         self.scaled_log_evidence += log_probability
-        self.learn_from_look()
-        previous, action, pattern = self.history.step(len(self.history.evidence) - 1)
-        if self.parameters.learn_in_trial and pattern is not None:
-            self._compiled.learn(previous, action, pattern)
+        self.model.learn(*seen)
 
     def predict(self, action: AnyAction) -> None:
         """Predict the effect of an action, the last of ``history``."""

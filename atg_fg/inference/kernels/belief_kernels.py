@@ -1,11 +1,12 @@
 """The steps of a Bayes filter over object and aspect, and of its decision, each a loop over the hypotheses.
 
 The symbols and the numbers are those of ``docs/model.md``: hypothesis h knows ``n_known[h]`` aspects, states 1 to n;
-state 0 is its collection node. ``prior_weight`` and ``probability`` are what the counts come to with the concentration
-α: a transition row is ``prior_weight · base_row`` plus its edges. Loops end at n; the rest
-of a row is padding.
+state 0 is its collection node. With α a transition row is a share of its base, and its edges. p(X_t | O) sums to one in
+each row. Loops end at n; the rest of a row is padding.
 
-This module loads Numba.
+What Python calls takes arrays and numbers in plain tuples, for to take named ones apart would cost as much as a step
+of a small memory does; and loops take them out of tuples before they begin, since each access to a member counts its
+users. This module loads Numba.
 """
 
 from __future__ import annotations
@@ -16,13 +17,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.inference.kernels.compilation import compiled, reordered
+from atg_fg.inference.kernels.compilation import compiled
 
-#: Smallest normal number, in place of zero under a logarithm: x ln x of what is below it is zero up to rounding.
-_LEAST: Final = float(np.finfo(np.float64).tiny)
+#: In place of an action: nothing happened, or the trial begins.
+REST: Final = -1
+BEGIN: Final = -2
+
+#: What a row leaves to its base is one less what its edges carry, unless less than this is left of the difference.
+_LEAST_DIFFERENCE: Final = 0.05
 
 #: Of few bytes; which type it is depends on the sizes.
 SmallIntArray = NDArray[Any]
+
+#: Target and source, count and probability of edges, as in ``Tables``.
+Edges = tuple[SmallIntArray, FloatArray, FloatArray]
 
 
 class Tables(NamedTuple):
@@ -31,22 +39,18 @@ class Tables(NamedTuple):
     Attributes:
         n_known: Aspects known, shape [H].
         pattern: Pattern of each state from 1 on, shape [H, W].
-        edge_start: First edge of each hypothesis, shape [H].
-        n_edges: How many it has, shape [H].
-        edges: Action, target and source of each counted transition, ascending in each hypothesis, shape [E, 3].
+        begins: Where the edges of each hypothesis and action begin, and where the last end, shape [H, A + 1].
+        edges: Target and source of each counted transition, ascending for each hypothesis and action, shape [E, 2].
         counted: How often it was counted, shape [E].
         probability: What it adds to its row, count / (c + α), shape [E].
-        prior_weight: What each row leaves to its base, α / (c + α), shape [H, A, W].
     """
 
     n_known: SmallIntArray
     pattern: SmallIntArray
-    edge_start: IntArray
-    n_edges: IntArray
+    begins: IntArray
     edges: SmallIntArray
     counted: FloatArray
     probability: FloatArray
-    prior_weight: FloatArray
 
 
 class Constants(NamedTuple):
@@ -59,289 +63,289 @@ class Constants(NamedTuple):
 
 
 @compiled
-def weigh_row(tables: Tables, hypothesis: int, source: int, action: int, concentration: float) -> None:
-    """Set what the counts of a transition row come to."""
-    first = tables.edge_start[hypothesis]
-    last = first + tables.n_edges[hypothesis]
-    total = 0.0
-    for edge in range(first, last):
-        if tables.edges[edge, 2] == source and tables.edges[edge, 0] == action:
-            total += tables.counted[edge]
-    total += concentration
-    for edge in range(first, last):
-        if tables.edges[edge, 2] == source and tables.edges[edge, 0] == action:
-            tables.probability[edge] = tables.counted[edge] / total
-    tables.prior_weight[hypothesis, action, source] = concentration / total
-
-
-@compiled
-def weigh(tables: Tables, hypotheses: IntArray, concentration: float) -> None:
-    """Set what the counts of all rows of some hypotheses come to."""
-    for hypothesis in hypotheses:
-        tables.prior_weight[hypothesis] = 1.0
-        first = tables.edge_start[hypothesis]
-        for edge in range(first, first + tables.n_edges[hypothesis]):
-            weigh_row(tables, hypothesis, tables.edges[edge, 2], tables.edges[edge, 0], concentration)
-
-
-@compiled
-def spread_by_base(tables: Tables, constants: Constants, aspects: FloatArray) -> None:
-    """Fill in p(X_0 | O), shape [H, W]."""
-    for hypothesis in range(len(tables.n_known)):
-        n_known = tables.n_known[hypothesis]
-        aspects[hypothesis, 0] = (constants.n_aspects - n_known) / constants.n_aspects
-        for state in range(1, n_known + 1):
-            aspects[hypothesis, state] = 1.0 / constants.n_aspects
-
-
-@compiled
-def predict(tables: Tables, constants: Constants, aspects: FloatArray, action: int, predicted: FloatArray) -> None:
-    """Fill in Σ_x p(x | O) p(x' | x, a, O), shape [H, W]."""
-    share = 1.0 / constants.n_aspects
-    for hypothesis in range(len(tables.n_known)):
-        n_known = tables.n_known[hypothesis]
-        kept = 0.0
-        for state in range(n_known + 1):
-            kept += aspects[hypothesis, state] * tables.prior_weight[hypothesis, action, state]
-        predicted[hypothesis, 0] = kept * ((constants.n_aspects - n_known) / constants.n_aspects)
-        for state in range(1, n_known + 1):
-            predicted[hypothesis, state] = kept * share
-        first = tables.edge_start[hypothesis]
-        for edge in range(first, first + tables.n_edges[hypothesis]):
-            if tables.edges[edge, 0] == action:
-                carried = aspects[hypothesis, tables.edges[edge, 2]] * tables.probability[edge]
-                predicted[hypothesis, tables.edges[edge, 1]] += carried
-
-
-@compiled
-def condition(
-    tables: Tables,
-    constants: Constants,
-    evidence: FloatArray,
-    aspects: FloatArray,
-    log_identity: FloatArray,
-    updated: FloatArray,
-    log_updated: FloatArray,
-    identity: FloatArray,
-) -> float:
-    """Condition the belief on a look; return ln p(z_t | z_0:t-1), or −∞ if it is impossible.
+def write_row(
+    tables: tuple[Any, ...], hypothesis: int, first: int, patterns: IntArray, counts: IntArray, concentration: float
+) -> None:
+    """Write what a hypothesis knows.
 
     Args:
-        tables: What is known.
-        constants: Of the model.
-        evidence: Likelihood of each pattern, shape [|𝒵|].
-        aspects: p(X_t | O, z_0:t-1), shape [H, W].
-        log_identity: ln p(O | z_0:t-1), shape [H].
-        updated: Filled with p(X_t | O, z_0:t).
-        log_updated: Filled with ln p(O | z_0:t).
-        identity: Filled with p(O | z_0:t).
+        tables: ``Tables``, changed in place.
+        hypothesis: Row to write.
+        first: Where its edges begin.
+        patterns: Of its aspects, shape [n].
+        counts: Source, action, target and count of each transition, shape [E', 4]; aspects begin with 0.
+        concentration: α.
     """
-    observed = 1.0 - constants.noise
-    noise = constants.noise / constants.n_patterns * evidence.sum()
-    support = np.flatnonzero(evidence)
-    last_knowing = np.full(constants.n_patterns, -1, np.int64)
+    n_known, pattern, begins, edges, counted, probability = tables
+    n_known[hypothesis] = len(patterns)
+    for number in range(len(patterns)):
+        pattern[hypothesis, number + 1] = patterns[number]
+    begins[hypothesis] = first
+    own = begins[hypothesis]
+    for row in range(len(counts)):
+        source, target = counts[row, 0] + 1, counts[row, 2] + 1
+        _count((edges, counted, probability), own, source, counts[row, 1], target, float(counts[row, 3]))
+    for action in range(len(own) - 1):
+        for edge in range(own[action], own[action + 1]):
+            _weigh((edges, counted, probability), own, edges[edge, 1], action, concentration)
+
+
+@compiled
+def _weigh(edges: Edges, begins: IntArray, source: int, action: int, concentration: float) -> None:
+    """Set what the counts of a transition row come to, where edges of the hypothesis begin at ``begins``, [A + 1]."""
+    ends, counted, probability = edges
+    total = concentration
+    for edge in range(begins[action], begins[action + 1]):
+        if ends[edge, 1] == source:
+            total += counted[edge]
+    for edge in range(begins[action], begins[action + 1]):
+        if ends[edge, 1] == source:
+            probability[edge] = counted[edge] / total
+
+
+@compiled
+def _count(edges: Edges, begins: IntArray, source: int, action: int, target: int, number: float) -> None:
+    """Count a transition so many times more; there is room for one more edge."""
+    ends, counted, probability = edges
+    first, place = begins[action], begins[action + 1]
+    while place > first and (
+        ends[place - 1, 0] > target or (ends[place - 1, 0] == target and ends[place - 1, 1] > source)
+    ):
+        place -= 1
+    if place > first and ends[place - 1, 0] == target and ends[place - 1, 1] == source:
+        counted[place - 1] += number
+        return
+    n_actions = len(begins) - 1
+    for edge in range(begins[n_actions], place, -1):
+        ends[edge, 0], ends[edge, 1] = ends[edge - 1, 0], ends[edge - 1, 1]
+        counted[edge], probability[edge] = counted[edge - 1], probability[edge - 1]
+    ends[place, 0], ends[place, 1] = target, source
+    counted[place] = number
+    for later in range(action + 1, n_actions + 1):
+        begins[later] += 1
+
+
+@compiled
+def move(tables: tuple[Any, ...], constants: tuple[Any, ...], aspects: FloatArray, action: int) -> None:
+    """Replace p(X_t | O), shape [H, W], by Σ_x p(x | O) p(x' | x, a, O), or at the beginning by p(X_0 | O)."""
+    n_known, _, begins, edges, counted, probability = tables
+    n_aspects, _, concentration, _ = constants
+    scratch = np.empty(64)
+    for hypothesis in range(len(n_known)):
+        n_states, first, last = n_known[hypothesis] + 1, 0, 0
+        kept = 1.0
+        if action >= 0:
+            first, last = begins[hypothesis, action], begins[hypothesis, action + 1]
+            if last - first > len(scratch):
+                scratch = np.empty(2 * (last - first))
+            for edge in range(first, last):
+                carried = aspects[hypothesis, edges[edge, 1]] * probability[edge]
+                scratch[edge - first] = carried
+                kept -= carried
+            if kept < _LEAST_DIFFERENCE:
+                kept = _kept(aspects[hypothesis, :n_states], edges[first:last], counted[first:last], concentration)
+        share = kept / n_aspects
+        aspects[hypothesis, 0] = share * (n_aspects + 1 - n_states)
+        for state in range(1, n_states):
+            aspects[hypothesis, state] = share
+        for edge in range(first, last):
+            aspects[hypothesis, edges[edge, 0]] += scratch[edge - first]
+
+
+@compiled
+def _kept(aspects: FloatArray, edges: SmallIntArray, counted: FloatArray, concentration: float) -> float:
+    """Return Σ_x p(x | O) α / (c + α) of one hypothesis and action, a sum of what may be very small."""
+    totals = np.zeros(len(aspects))
+    for edge in range(len(edges)):
+        totals[edges[edge, 1]] += counted[edge]
+    kept = 0.0
+    for state in range(len(aspects)):
+        kept += aspects[state] * (concentration / (totals[state] + concentration) if totals[state] > 0.0 else 1.0)
+    return kept
+
+
+@compiled
+def step(
+    tables: tuple[Any, ...],
+    constants: tuple[Any, ...],
+    belief: tuple[FloatArray, FloatArray, FloatArray],
+    action: int,
+    evidence: FloatArray,
+    learned: tuple[int, int, int, int],
+    shown: SmallIntArray,
+) -> float:
+    """Act, take in a look and learn from it; return ln p(z_t | z_0:t-1).
+
+    If the look is impossible, that is −∞, and nothing but the action is done.
+
+    Args:
+        tables: ``Tables``, extended by what is learned; there is room for one more aspect and one more edge a row.
+        constants: ``Constants``.
+        belief: p(X | O), shape [H, W], ln p(O) and p(O), both of shape [H]; replaced by what they are after the look.
+        action: What was done since the last look, ``REST`` or ``BEGIN``.
+        evidence: Likelihood of each pattern, shape [|𝒵|].
+        learned: What there is to learn: the pattern before, the action since then and the pattern seen now, −1 of what
+            there is not; and the pattern that ``shown`` is about.
+        shown: The state of each hypothesis that shows a pattern learned before, 0 if none does, shape [H]; replaced by
+            that of the pattern learned now.
+    """
+    n_known, pattern = tables[0], tables[1]
+    n_aspects, n_patterns, _, delta = constants
+    aspects, log_identity, identity = belief
+    n_hypotheses = len(n_known)
+    if action != REST:
+        move(tables, constants, aspects, action)
+    allowed, weight, whole = 0, 0.0, -1
+    for each in range(n_patterns):
+        if evidence[each] != 0.0:
+            weight += evidence[each]
+            allowed, whole = allowed + 1, each
+    totals, rates, updated = np.empty(n_hypotheses), np.empty(n_hypotheses), np.empty(n_hypotheses)
+    states = np.zeros(n_hypotheses, n_known.dtype)
+    if allowed == 1:
+        _explain_one(tables, constants, aspects, whole, weight, (totals, rates), states)
+    else:
+        whole = -1
+        _explain(tables, constants, aspects, evidence, (totals, rates))
     peak = -np.inf
-    for hypothesis in range(len(tables.n_known)):
-        n_known = tables.n_known[hypothesis]
-        total = 0.0
-        for state in range(1, n_known + 1):
-            pattern = tables.pattern[hypothesis, state]
-            last_knowing[pattern] = hypothesis
-            updated[hypothesis, state] = aspects[hypothesis, state] * (observed * evidence[pattern] + noise)
-            total += updated[hypothesis, state]
-        rate = 0.0
-        if n_known < constants.n_aspects:
-            # A sum, not a difference of sums: it may be nothing, exactly.
-            for pattern in support:
-                if last_knowing[pattern] != hypothesis:
-                    rate += evidence[pattern]
-            rate *= observed / (constants.n_patterns - n_known)
-        updated[hypothesis, 0] = aspects[hypothesis, 0] * (rate + noise)
-        total += updated[hypothesis, 0]
-        if total > 0.0:
-            log_updated[hypothesis] = log_identity[hypothesis] + np.log(total)
-            for state in range(n_known + 1):
-                updated[hypothesis, state] /= total
-        else:
-            # A hypothesis that is ruled out keeps its prediction; its weight is zero from here on.
-            log_updated[hypothesis] = -np.inf
-            for state in range(n_known + 1):
-                updated[hypothesis, state] = aspects[hypothesis, state]
-        peak = max(peak, log_updated[hypothesis])
+    for hypothesis in range(n_hypotheses):
+        log_total = np.log(totals[hypothesis]) if totals[hypothesis] > 0.0 else -np.inf
+        updated[hypothesis] = log_identity[hypothesis] + log_total
+        peak = max(peak, updated[hypothesis])
     if not np.isfinite(peak):
         return -np.inf
     total = 0.0
-    for hypothesis in range(len(tables.n_known)):
-        total += np.exp(log_updated[hypothesis] - peak)
+    for hypothesis in range(n_hypotheses):
+        identity[hypothesis] = np.exp(updated[hypothesis] - peak)
+        total += identity[hypothesis]
     log_probability = peak + np.log(total)
-    for hypothesis in range(len(tables.n_known)):
-        log_updated[hypothesis] -= log_probability
-        identity[hypothesis] = np.exp(log_updated[hypothesis])
+    observed, noise = 1.0 - delta, delta / n_patterns * weight
+    for hypothesis in range(n_hypotheses):
+        log_identity[hypothesis] = updated[hypothesis] - log_probability
+        identity[hypothesis] /= total
+        # A hypothesis that is ruled out keeps its prediction; its weight is zero from here on.
+        if totals[hypothesis] > 0.0:
+            scale, matching = 1.0 / totals[hypothesis], states[hypothesis]
+            aspects[hypothesis, 0] *= (rates[hypothesis] + noise) * scale
+            if whole >= 0:
+                shows = aspects[hypothesis, matching] * ((observed * weight + noise) * scale)
+                for state in range(1, n_known[hypothesis] + 1):
+                    aspects[hypothesis, state] *= noise * scale
+                if matching > 0:
+                    aspects[hypothesis, matching] = shows
+            else:
+                for state in range(1, n_known[hypothesis] + 1):
+                    aspects[hypothesis, state] *= (observed * evidence[pattern[hypothesis, state]] + noise) * scale
+    if learned[2] >= 0:
+        _learn(tables, constants, aspects, learned, states, whole == learned[2], shown)
     return float(log_probability)
 
 
 @compiled
-def learn(tables: Tables, constants: Constants, aspects: FloatArray, previous: int, action: int, pattern: int) -> None:
-    """Extend every hypothesis by a complete look, and divide the belief of its collection node.
+def _learn(
+    tables: tuple[Any, ...],
+    constants: tuple[Any, ...],
+    aspects: FloatArray,
+    learned: tuple[int, int, int, int],
+    states: SmallIntArray,
+    is_known: bool,
+    shown: SmallIntArray,
+) -> None:
+    """Extend every hypothesis by a look, and divide the belief of its collection node.
 
-    There is room for one more aspect and one more edge in each row.
-
-    Args:
-        tables: Extended in place.
-        constants: Of the model.
-        aspects: p(X_t | O, z_0:t), shape [H, W]; changed in place.
-        previous: Pattern seen one step earlier, −1 if that look was not complete.
-        action: Action since then.
-        pattern: Pattern seen now.
+    ``states`` shows the pattern seen now if ``is_known``; for the rest see ``step``.
     """
-    for hypothesis in range(len(tables.n_known)):
-        n_known = tables.n_known[hypothesis]
-        source, target = 0, 0
-        for state in range(1, n_known + 1):
-            shown = tables.pattern[hypothesis, state]
-            if shown == previous:
-                source = state
-            if shown == pattern:
-                target = state
-        if target == 0:
-            if n_known == constants.n_aspects:
-                continue
-            target = n_known + 1
-            truth = (1.0 - constants.noise) / (constants.n_patterns - n_known)
-            share = truth / (truth + constants.noise / constants.n_patterns)
-            revealed = aspects[hypothesis, 0] * (1.0 if target == constants.n_aspects else share)
-            tables.n_known[hypothesis] = target
-            tables.pattern[hypothesis, target] = pattern
+    n_known, pattern, begins, edges, counted, probability = tables
+    n_aspects, n_patterns, concentration, delta = constants
+    before, action, seen, shown_before = learned
+    noise = delta / n_patterns
+    for hypothesis in range(len(n_known)):
+        n_own, source = n_known[hypothesis], 0
+        if before >= 0:
+            if before == shown_before:
+                source = shown[hypothesis]
+            else:
+                source = _state_showing(pattern[hypothesis, : n_own + 1], before)
+        target = states[hypothesis] if is_known else _state_showing(pattern[hypothesis, : n_own + 1], seen)
+        if target == 0 and n_own < n_aspects:
+            target = n_own + 1
+            truth = (1.0 - delta) / (n_patterns - n_own)
+            revealed = aspects[hypothesis, 0] * (1.0 if target == n_aspects else truth / (truth + noise))
+            n_known[hypothesis] = target
+            pattern[hypothesis, target] = seen
             aspects[hypothesis, target] = revealed
             aspects[hypothesis, 0] -= revealed
-            if previous == pattern:
+            if before == seen:
                 source = target
-        if source > 0:
-            count(tables, hypothesis, source, action, target)
-            weigh_row(tables, hypothesis, source, action, constants.concentration)
+        if source > 0 and target > 0:
+            own = begins[hypothesis]
+            _count((edges, counted, probability), own, source, action, target, 1.0)
+            _weigh((edges, counted, probability), own, source, action, concentration)
+        shown[hypothesis] = target
 
 
 @compiled
-def count(tables: Tables, hypothesis: int, source: int, action: int, target: int) -> None:
-    """Count a transition once more; there is room for one more edge."""
-    first = tables.edge_start[hypothesis]
-    place = first + tables.n_edges[hypothesis]
-    while place > first and not _precedes(tables, place - 1, action, target, source):
-        place -= 1
-    new = first + tables.n_edges[hypothesis]
-    if place < new:
-        edges = tables.edges
-        if edges[place, 0] == action and edges[place, 1] == target and edges[place, 2] == source:
-            tables.counted[place] += 1.0
-            return
-    for edge in range(new, place, -1):
-        tables.edges[edge] = tables.edges[edge - 1]
-        tables.counted[edge], tables.probability[edge] = tables.counted[edge - 1], tables.probability[edge - 1]
-    tables.edges[place, 0], tables.edges[place, 1], tables.edges[place, 2] = action, target, source
-    tables.counted[place] = 1.0
-    tables.n_edges[hypothesis] += 1
+def _state_showing(patterns: SmallIntArray, wanted: int) -> int:
+    """Return which state of one hypothesis shows a pattern, 0 if none does."""
+    found = 0
+    for state in range(1, len(patterns)):
+        if patterns[state] == wanted:
+            found = state
+    return found
 
 
 @compiled
-def _precedes(tables: Tables, edge: int, action: int, target: int, source: int) -> bool:
-    """Return whether an edge comes before another."""
-    if tables.edges[edge, 0] != action:
-        return bool(tables.edges[edge, 0] < action)
-    if tables.edges[edge, 1] != target:
-        return bool(tables.edges[edge, 1] < target)
-    return bool(tables.edges[edge, 2] < source)
-
-
-@compiled
-def joint_terms(
-    tables: Tables,
-    constants: Constants,
-    belief: tuple[FloatArray, FloatArray],
-    block: tuple[int, int],
-    predictive: FloatArray,
-    terms: FloatArray,
-    ends: IntArray,
+def _explain_one(
+    tables: tuple[Any, ...],
+    constants: tuple[Any, ...],
+    aspects: FloatArray,
+    wanted: int,
+    weight: float,
+    filled: tuple[FloatArray, FloatArray],
+    states: SmallIntArray,
 ) -> None:
-    """Fill in the values x that p(O = i, z_t+1 | a) takes for the hypotheses of a block, and how often.
+    """Fill in p(z | O), what the collection node adds to the noise, and the state that shows the only pattern."""
+    n_known, pattern = tables[0], tables[1]
+    n_aspects, n_patterns, _, delta = constants
+    totals, rates = filled
+    observed, noise = (1.0 - delta) * weight, delta / n_patterns * weight
+    for hypothesis in range(len(n_known)):
+        n_own = n_known[hypothesis]
+        state, rate, total = _state_showing(pattern[hypothesis, : n_own + 1], wanted), 0.0, noise
+        if state > 0:
+            total += aspects[hypothesis, state] * observed
+        elif n_own < n_aspects:
+            rate = observed / (n_patterns - n_own)
+            total += aspects[hypothesis, 0] * rate
+        states[hypothesis], totals[hypothesis], rates[hypothesis] = state, total, rate
 
-    ``atg_fg.inference.expected_entropy`` says which these are. The caller takes the logarithms: many at once take much
-    less time than one by one. After the last block p(z | a) of each pattern follows, −1 times.
 
-    Args:
-        tables: What is known.
-        constants: Of the model.
-        belief: p(O | z_0:t), shape [H], and p(X_t | O, z_0:t), shape [H, W].
-        block: First hypothesis and the one after the last.
-        predictive: What earlier blocks add to p(z | a), shape [A, |𝒵|]; that of this block is added.
-        terms: Filled with x and how often it counts, shape [A, 2, N]; there are two values a hypothesis, one an edge,
-            and one a pattern.
-        ends: Filled with the number of terms of each action, shape [A].
-    """
-    identity, aspects = belief
-    observed, n_patterns, n_actions = 1.0 - constants.noise, constants.n_patterns, len(ends)
-    added, everywhere = np.zeros((n_actions, n_patterns)), np.zeros(n_actions)
-    unreached, more, n_unreached = np.empty(n_actions), np.empty(n_actions), np.empty(n_actions)
-    ends[:] = 0
-    for hypothesis in range(block[0], block[1]):
-        probability, n_known = identity[hypothesis], tables.n_known[hypothesis]
-        noise = constants.noise / n_patterns * probability
+@compiled
+def _explain(
+    tables: tuple[Any, ...],
+    constants: tuple[Any, ...],
+    aspects: FloatArray,
+    evidence: FloatArray,
+    filled: tuple[FloatArray, FloatArray],
+) -> None:
+    """Fill in p(z | O), and what the collection node adds to the noise, for evidence that allows any patterns."""
+    n_known, pattern = tables[0], tables[1]
+    n_aspects, n_patterns, _, delta = constants
+    totals, rates = filled
+    observed, noise = 1.0 - delta, delta / n_patterns * evidence.sum()
+    support = np.flatnonzero(evidence)
+    last_knowing = np.full(n_patterns, -1, np.int64)
+    for hypothesis in range(len(n_known)):
+        total = noise
+        for state in range(1, n_known[hypothesis] + 1):
+            shows = pattern[hypothesis, state]
+            last_knowing[shows] = hypothesis
+            total += aspects[hypothesis, state] * (observed * evidence[shows])
         rate = 0.0
-        if n_known < constants.n_aspects:
-            share = (constants.n_aspects - n_known) / constants.n_aspects
-            rate = share * (observed / (n_patterns - n_known))
-        for action in range(n_actions):
-            kept = 0.0
-            for state in range(n_known + 1):
-                kept += aspects[hypothesis, state] * tables.prior_weight[hypothesis, action, state]
-            kept *= probability
-            unknown = kept * rate + noise
-            unreached[action] = kept * (observed / constants.n_aspects) + noise
-            more[action] = unreached[action] - unknown
-            n_unreached[action] = n_known
-            everywhere[action] += unknown
-            term = ends[action]
-            terms[action, 0, term], terms[action, 1, term] = max(unknown, _LEAST), n_patterns - n_known
-            ends[action] = term + 1
-        for state in range(1, n_known + 1):
-            pattern = tables.pattern[hypothesis, state]
-            for action in range(n_actions):
-                added[action, pattern] += more[action]
-        edge = tables.edge_start[hypothesis]
-        last = edge + tables.n_edges[hypothesis]
-        while edge < last:
-            action, target = tables.edges[edge, 0], tables.edges[edge, 1]
-            arrived = aspects[hypothesis, tables.edges[edge, 2]] * tables.probability[edge]
-            edge += 1
-            while edge < last and tables.edges[edge, 1] == target and tables.edges[edge, 0] == action:
-                arrived += aspects[hypothesis, tables.edges[edge, 2]] * tables.probability[edge]
-                edge += 1
-            arrived *= observed * probability
-            added[action, tables.pattern[hypothesis, target]] += arrived
-            n_unreached[action] -= 1.0
-            term = ends[action]
-            terms[action, 0, term], terms[action, 1, term] = max(unreached[action] + arrived, _LEAST), 1.0
-            ends[action] = term + 1
-        for action in range(n_actions):
-            term = ends[action]
-            terms[action, 0, term], terms[action, 1, term] = max(unreached[action], _LEAST), n_unreached[action]
-            ends[action] = term + 1
-    for action in range(n_actions):
-        for pattern in range(n_patterns):
-            predictive[action, pattern] += added[action, pattern] + everywhere[action]
-    if block[1] == len(tables.n_known):
-        for action in range(n_actions):
-            for pattern in range(n_patterns):
-                # Subtracting may leave a rounding error below zero.
-                term = ends[action]
-                terms[action, 0, term], terms[action, 1, term] = max(predictive[action, pattern], _LEAST), -1.0
-                ends[action] = term + 1
-
-
-@reordered
-def add_up(terms: FloatArray, logarithms: FloatArray, ends: IntArray, sums: FloatArray) -> None:
-    """Add Σ x ln x of each action, as often as each counts, to ``sums``, shape [A]; logarithms are of [A, N'] terms."""
-    for action in range(len(ends)):
-        total = 0.0
-        for term in range(ends[action]):
-            total += terms[action, 1, term] * terms[action, 0, term] * logarithms[action, term]
-        sums[action] += total
+        if n_known[hypothesis] < n_aspects:
+            # A sum, not a difference of sums: it may be nothing, exactly.
+            for each in support:
+                if last_knowing[each] != hypothesis:
+                    rate += evidence[each]
+            rate *= observed / (n_patterns - n_known[hypothesis])
+        totals[hypothesis], rates[hypothesis] = total + aspects[hypothesis, 0] * rate, rate

@@ -40,13 +40,17 @@ def compiled(function: _Function) -> _Function:
     Raises:
         MissingDependencyError: Numba is not installed.
     """
-    result: _Function = _numba().njit(cache=True)(function)
+    result: _Function = _numba().njit(cache=True, error_model="numpy")(function)
     return result
 
 
 def reordered(function: _Function) -> _Function:
-    """Have Numba compile a function as ``compiled`` does, and let it change the order in which numbers are added up."""
-    result: _Function = _numba().njit(cache=True, fastmath={"reassoc", "contract"})(function)
+    """Have Numba compile a function as ``compiled`` does, and let it change the order in which numbers are added up.
+
+    It may then take several at once, which a check for division by zero would forbid.
+    """
+    options = {"cache": True, "error_model": "numpy", "fastmath": {"reassoc", "contract"}}
+    result: _Function = _numba().njit(**options)(function)
     return result
 
 

@@ -10,8 +10,9 @@ import numpy as np
 
 from atg_fg.core.compact.columns import positions
 from atg_fg.core.memory import RobotMemory
-from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.inference.kernels.belief_kernels import Tables, weigh
+from atg_fg.core.aspect_graph import AspectTransitionGraph
+from atg_fg.core.patterns import FloatArray
+from atg_fg.inference.kernels.belief_kernels import Tables, write_row
 
 #: Room that each row has for the aspects and edges that a trial finds, before rows have to be moved.
 ROOM: Final = 12
@@ -19,6 +20,8 @@ ROOM: Final = 12
 
 #: Rows that there is more room for, at most.
 _MOST_MORE: Final = 1000
+
+_Types = tuple[type[np.unsignedinteger[Any]], type[np.unsignedinteger[Any]]]
 
 #: Trials whose arrays are kept: one that has ended, and the one before it, as the next begins before it is gone.
 _SPARE: Final = 2
@@ -30,12 +33,10 @@ class TrialArrays(NamedTuple):
     Attributes:
         tables: What its hypotheses know.
         aspects: Room for p(X_t | O), shape [H, W], with any content.
-        next_aspects: The same for the next time.
     """
 
     tables: Tables
     aspects: FloatArray
-    next_aspects: FloatArray
 
 
 class MemoryTables:
@@ -53,48 +54,44 @@ class MemoryTables:
     def __init__(self, memory: RobotMemory, concentration: float) -> None:
         self._n_aspects = memory.assumptions.n_aspects
         self._n_actions = len(memory.assumptions.actions)
-        largest = max(self._n_aspects, self._n_actions, len(memory.assumptions.alphabet))
-        self._small = np.uint16 if largest <= np.iinfo(np.uint16).max else np.uint32
+        is_small = max(self._n_aspects, self._n_actions) <= np.iinfo(np.uint8).max
+        is_small &= len(memory.assumptions.alphabet) <= np.iinfo(np.uint16).max
+        self._types: _Types = (np.uint8, np.uint16) if is_small else (np.uint32, np.uint32)
         self._concentration = concentration
         self._lock = threading.RLock()
         self._tables: Tables
         self._n_edges = 0
-        self._counts: list[IntArray] = []
-        self._n_known: list[int] = []
+        self._revisions: list[int] = []
         self._spare: list[TrialArrays] = []
-        self._make(memory)
+        self._readers: weakref.WeakSet[Any] = weakref.WeakSet()
+        self._make(list(memory))
 
-    def copy_for(self, memory: RobotMemory, trial: object) -> TrialArrays:
-        """Return the tables of the memory as it is now, for a trial to extend: ``ROOM`` times, to begin with.
+    def lend(self, memory: RobotMemory, trial: object, *, extends: bool) -> TrialArrays:
+        """Return the tables of the memory as it is now.
 
         Args:
             memory: As it is now.
-            trial: Who extends them; when it is gone, the next trial gets the same arrays.
+            trial: Who gets them; when it is gone, the next trial gets the same arrays.
+            extends: Whether it extends them, ``ROOM`` times to begin with, and so needs a copy.
         """
         with self._lock:
-            self._bring_up_to_date(memory)
-            kept, n_rows, n_edges = self._tables, len(memory) + 1, self._n_edges + ROOM
+            self._bring_up_to_date(list(memory))
+            n_rows = len(memory) + 1
             lent = self._spare.pop() if self._spare else self._like_kept()
             weakref.finalize(trial, self._take_back, lent).atexit = False
-            tables = Tables(
-                lent.tables.n_known[:n_rows],
-                lent.tables.pattern[:n_rows],
-                lent.tables.edge_start[:n_rows],
-                lent.tables.n_edges[:n_rows],
-                lent.tables.edges[:n_edges],
-                lent.tables.counted[:n_edges],
-                lent.tables.probability[:n_edges],
-                lent.tables.prior_weight[:n_rows],
-            )
-            for own, array in zip(tables, kept, strict=True):
-                np.copyto(own, array[: len(own)])
-            tables.edge_start[-1] = self._n_edges
-            return TrialArrays(tables, lent.aspects[:n_rows], lent.next_aspects[:n_rows])
+            if not extends:
+                self._readers.add(trial)
+                return TrialArrays(_part(self._tables, n_rows, self._n_edges), lent.aspects[:n_rows])
+            tables = _part(lent.tables, n_rows, self._n_edges + ROOM)
+            for own, array in zip(tables, self._tables, strict=True):
+                own[...] = array[: len(own)]
+            tables.begins[-1] = self._n_edges
+            return TrialArrays(tables, lent.aspects[:n_rows])
 
     def _like_kept(self) -> TrialArrays:
         n_rows, width = shape = self._tables.pattern.shape
-        tables = _empty(n_rows, len(self._tables.counted), width, self._n_actions, self._small)
-        return TrialArrays(tables, np.zeros(shape), np.zeros(shape))
+        tables = _empty(n_rows, len(self._tables.counted), width, self._n_actions, self._types)
+        return TrialArrays(tables, np.zeros(shape))
 
     def _take_back(self, lent: TrialArrays) -> None:
         """Keep the arrays of a trial that is gone for the next: new memory costs more than copying into old."""
@@ -103,91 +100,86 @@ class MemoryTables:
             if fits and len(self._spare) < _SPARE:
                 self._spare.append(lent)
 
-    def _bring_up_to_date(self, memory: RobotMemory) -> None:
-        # A graph makes another count table whenever an edge is counted, and its aspects only grow.
-        counts = [graph.count_table for graph in memory]
-        n_known = [graph.n_known for graph in memory]
-        n_before = len(self._counts)
-        changed = [
-            number
-            for number, (new, old) in enumerate(zip(counts, self._counts, strict=False))
-            if new is not old or n_known[number] != self._n_known[number]
-        ]
-        changed += range(n_before, len(counts))
-        if not changed and len(counts) == n_before:
+    def _bring_up_to_date(self, graphs: list[AspectTransitionGraph]) -> None:
+        revisions = [graph.revision for graph in graphs]
+        if revisions == self._revisions:
             return
-        if len(counts) < n_before or not self._fits(changed, counts, n_known):
-            self._make(memory)
+        before = [*self._revisions, *[-1] * (len(graphs) - len(self._revisions))]
+        changed = [number for number, (new, old) in enumerate(zip(revisions, before, strict=False)) if new != old]
+        if len(graphs) < len(self._revisions) or not self._fits([graphs[number] for number in changed], len(graphs)):
+            self._make(graphs)
             return
-        graphs = list(memory)
+        if len(self._readers):  # they go on with the tables as they were
+            self._tables = Tables(*(array.copy() for array in self._tables))
+            self._readers.clear()
         for number in changed:
-            self._write(number, graphs[number].pattern_indices, counts[number])
-        self._counts, self._n_known = counts, n_known
-        weigh(self._tables, np.array(changed, dtype=np.int64), self._concentration)
+            self._write(number, graphs[number])
+        self._revisions = revisions
 
-    def _fits(self, changed: list[int], counts: list[IntArray], n_known: list[int]) -> bool:
+    def _fits(self, changed: list[AspectTransitionGraph], n_graphs: int) -> bool:
         """Return whether rows can be written, and a trial can extend them."""
         width = self._tables.pattern.shape[1]
         return (
-            len(counts) < len(self._tables.n_known)
-            and self._n_edges + sum(len(counts[number]) + ROOM for number in changed) + ROOM
-            <= len(self._tables.counted)
-            and all(min(n_known[number] + ROOM, self._n_aspects) < width for number in changed)
+            n_graphs < len(self._tables.n_known)
+            and self._n_edges + sum(graph.n_counted + ROOM for graph in changed) + ROOM <= len(self._tables.counted)
+            and all(min(graph.n_known + ROOM, self._n_aspects) < width for graph in changed)
         )
 
-    def _write(self, number: int, patterns: tuple[int, ...], counts: IntArray) -> None:
+    def _write(self, number: int, graph: AspectTransitionGraph) -> None:
         """Write the row of an object; its edges go behind all others."""
-        tables = self._tables
-        first, last = self._n_edges, self._n_edges + len(counts)
-        tables.n_known[number] = len(patterns)
-        tables.pattern[number, 1 : 1 + len(patterns)] = patterns
-        tables.edge_start[number], tables.n_edges[number] = first, len(counts)
-        # The collection node is state 0, and so the aspect of number 0 state 1.
-        source, action, target, counted = counts.T
-        order = np.lexsort((source, target, action))
-        tables.edges[first:last] = np.stack((action, target + 1, source + 1), axis=1)[order]
-        tables.counted[first:last] = counted[order]
-        self._n_edges = last + ROOM
+        patterns = np.array(graph.pattern_indices, dtype=np.int64)
+        write_row(tuple(self._tables), number, self._n_edges, patterns, graph.count_table, self._concentration)
+        self._n_edges += graph.n_counted + ROOM
 
-    def _make(self, memory: RobotMemory) -> None:
+    def _make(self, graphs: list[AspectTransitionGraph]) -> None:
         """Make all tables anew, with half as many rows again as there are, but for large memories."""
-        graphs = list(memory)
-        self._counts = [graph.count_table for graph in graphs]
-        self._n_known = [graph.n_known for graph in graphs]
         n_rows = len(graphs) + 1
-        n_edges = sum(map(len, self._counts)) + ROOM * n_rows
+        n_edges = sum(graph.n_counted for graph in graphs) + ROOM * n_rows
         more = min(16 + n_rows // 2, _MOST_MORE)
-        width = 1 + min(max(self._n_known, default=0) + 2 * ROOM, self._n_aspects)
-        self._tables = _empty(n_rows + more, n_edges + 2 * ROOM * more, width, self._n_actions, self._small)
+        width = 1 + min(max((graph.n_known for graph in graphs), default=0) + 2 * ROOM, self._n_aspects)
+        self._tables = _empty(n_rows + more, n_edges + 2 * ROOM * more, width, self._n_actions, self._types)
         self._n_edges = 0
         self._spare.clear()
-        for number, (graph, counts) in enumerate(zip(graphs, self._counts, strict=True)):
-            self._write(number, graph.pattern_indices, counts)
-        weigh(self._tables, np.arange(len(graphs)), self._concentration)
+        self._readers.clear()
+        for number, graph in enumerate(graphs):
+            self._write(number, graph)
+        self._revisions = [graph.revision for graph in graphs]
 
 
-def _empty(n_rows: int, n_edges: int, width: int, n_actions: int, small: type[np.integer[Any]]) -> Tables:
-    """Return tables of hypotheses that know nothing."""
+def _part(tables: Tables, n_rows: int, n_edges: int) -> Tables:
+    """Return the first rows and edges of tables, as views."""
     return Tables(
-        np.zeros(n_rows, small),
-        np.zeros((n_rows, width), small),
-        np.zeros(n_rows, np.int64),
-        np.zeros(n_rows, small),
-        np.zeros((n_edges, 3), small),
+        tables.n_known[:n_rows],
+        tables.pattern[:n_rows],
+        tables.begins[:n_rows],
+        tables.edges[:n_edges],
+        tables.counted[:n_edges],
+        tables.probability[:n_edges],
+    )
+
+
+def _empty(n_rows: int, n_edges: int, width: int, n_actions: int, types: _Types) -> Tables:
+    """Return tables of hypotheses that know nothing; the types are those of states and of patterns."""
+    of_states, of_patterns = types
+    return Tables(
+        np.zeros(n_rows, of_states),
+        np.zeros((n_rows, width), of_patterns),
+        np.zeros((n_rows, n_actions + 1), np.int64),
+        np.zeros((n_edges, 2), of_states),
         np.zeros(n_edges),
         np.zeros(n_edges),
-        np.ones((n_rows, n_actions, width)),
     )
 
 
 def with_more_room(tables: Tables, room: int, n_aspects: int) -> Tables:
     """Return the same tables with room for so many more aspects, of |G| at most, and edges in each row."""
-    n_edges = tables.n_edges.astype(np.int64)
+    n_edges = tables.begins[:, -1] - tables.begins[:, 0]
     starts = np.cumsum(n_edges + room) - (n_edges + room)
     width = 1 + min(int(tables.n_known.max()) + room, n_aspects)
-    n_rows, n_actions, before = tables.prior_weight.shape
-    more = _empty(n_rows, int((n_edges + room).sum()), max(width, before), n_actions, tables.n_known.dtype.type)
-    there, here = positions(starts, n_edges), positions(tables.edge_start, n_edges)
+    n_rows, before = tables.pattern.shape
+    types = (tables.n_known.dtype.type, tables.pattern.dtype.type)
+    more = _empty(n_rows, int((n_edges + room).sum()), max(width, before), tables.begins.shape[1] - 1, types)
+    there, here = positions(starts, n_edges), positions(tables.begins[:, 0], n_edges)
     for old, new in (
         (tables.edges, more.edges),
         (tables.counted, more.counted),
@@ -195,21 +187,22 @@ def with_more_room(tables: Tables, room: int, n_aspects: int) -> Tables:
     ):
         new[there] = old[here]
     more.pattern[:, :before] = tables.pattern
-    more.prior_weight[:, :, :before] = tables.prior_weight
-    return more._replace(n_known=tables.n_known, edge_start=starts, n_edges=tables.n_edges)
+    more.begins[...] = tables.begins + (starts - tables.begins[:, 0])[:, None]
+    return more._replace(n_known=tables.n_known)
 
 
 #: Tables by memory, which is known by its ``id`` while it lives: memories compare by content.
 _kept: Final[dict[int, dict[float, MemoryTables]]] = {}
 
 
-def arrays_for_trial(memory: RobotMemory, concentration: float, trial: object) -> TrialArrays:
-    """Return the tables of a memory for a trial to extend; those of the last trial are brought up to date for it.
+def arrays_for_trial(memory: RobotMemory, concentration: float, trial: object, *, extends: bool) -> TrialArrays:
+    """Return the tables of a memory for a trial; those of the last trial are brought up to date for it.
 
     Args:
         memory: As it is now.
         concentration: α.
-        trial: Who extends them.
+        trial: Who works on them.
+        extends: Whether it extends them.
     """
     if id(memory) not in _kept:
         _kept[id(memory)] = {}
@@ -218,4 +211,4 @@ def arrays_for_trial(memory: RobotMemory, concentration: float, trial: object) -
     if concentration not in kept:
         kept.clear()  # of one α at a time
         kept[concentration] = MemoryTables(memory, concentration)
-    return kept[concentration].copy_for(memory, trial)
+    return kept[concentration].lend(memory, trial, extends=extends)
