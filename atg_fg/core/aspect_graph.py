@@ -104,7 +104,10 @@ class AspectTransitionGraph:
             raise InvalidInputError(
                 f"{self.name}: {self.n_known + 1} aspects; expected at most n_aspects = {self.assumptions.n_aspects}"
             )
-        self._aspect_of[index] = self.n_known
+        return self._add_aspect(index)
+
+    def _add_aspect(self, pattern: int) -> int:
+        self._aspect_of[pattern] = self.n_known
         self.revision = next(_revisions)
         return self.n_known - 1
 
@@ -121,8 +124,11 @@ class AspectTransitionGraph:
                 )
             whole_number(aspect, f"{self.name}: {role} aspect", 0, self.n_known - 1)
         self._check_action(action)
-        edge = (int(source), int(action), int(target))
-        total = self._counts.get(edge, 0) + whole_number(count, f"{self.name}: count", 1, MAX_NUMBER)
+        whole_number(count, f"{self.name}: count", 1, MAX_NUMBER)
+        self._add_transition((int(source), int(action), int(target)), int(count))
+
+    def _add_transition(self, edge: Edge, count: int = 1) -> None:
+        total = self._counts.get(edge, 0) + count
         if total > MAX_NUMBER:  # not exact as a floating-point number, and refused by whoever reads a file with it
             raise InvalidInputError(f"{self.name}: count {total}; expected a sum of at most 2^53")
         self._counts[edge] = total
@@ -146,16 +152,17 @@ class AspectTransitionGraph:
             raise InvalidInputError(
                 f"{self.name}: {len(patterns)} observations, {len(actions)} actions; expected one observation more"
             )
+        most = len(self.assumptions.alphabet) - 1
         for pattern in patterns:
             if pattern is not None:
-                whole_number(pattern, f"{self.name}: pattern", 0, len(self.assumptions.alphabet) - 1)
+                whole_number(pattern, f"{self.name}: pattern", 0, most)
         for action in actions:
             if action is not None:
                 self._check_action(action)
         aspects = [self._aspect_for(pattern) for pattern in patterns]
         for source, action, target in zip(aspects, actions, aspects[1:], strict=False):
             if source is not None and action is not None and target is not None:
-                self.add_transition(source, action, target)
+                self._add_transition((source, int(action), target))
 
     def relabelled(self, assumptions: Assumptions, labels: Relabelling) -> AspectTransitionGraph:
         """Return the same graph under assumptions with another alphabet."""
@@ -182,7 +189,7 @@ class AspectTransitionGraph:
         if pattern is None:
             return None
         if pattern not in self._aspect_of and self.n_unobserved > 0:
-            return self.add_aspect(self.assumptions.alphabet.patterns[pattern])
+            return self._add_aspect(int(pattern))
         return self._aspect_of.get(pattern)
 
     def unknown_transitions(self) -> Iterable[tuple[int, int]]:

@@ -53,6 +53,10 @@ LEAST_SHARE: Final = 1e-100
 MAX_PATTERNS: Final = 100_000
 
 
+#: Patterns up to which evidence of each of them is kept: 8 MB of weights.
+_MOST_KEPT: Final = 1000
+
+
 def read_only(array: Array) -> Array:
     """Return an array after making it one that cannot be written to."""
     array.setflags(write=False)
@@ -168,6 +172,14 @@ class PatternAlphabet:
     def _index_of(self) -> dict[Detection, int]:
         return {pattern: index for index, pattern in enumerate(self.patterns)}
 
+    def __getstate__(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if name != "_whole_looks"}
+
+    @cached_property
+    def _whole_looks(self) -> dict[Detection, Evidence]:
+        """Evidence of complete detections; it cannot be changed, and so serves many looks."""
+        return {}
+
     def index(self, pattern: Sequence[int | str]) -> int:
         """Return the index of a pattern.
 
@@ -267,6 +279,11 @@ class Evidence:
         Raises:
             InvalidInputError: The detection does not fit the alphabet, or the confidences do not fit the detection.
         """
+        # Most looks are whole, without confidences, and not the first of their kind. True and 1.0 are no symbols.
+        if type(detection) is tuple and not confidences and set(map(type, detection)) == {int}:
+            found = alphabet._whole_looks.get(detection)
+            if found is not None:
+                return found
         checked = alphabet.check_detection(detection)
         stated = check_confidences(confidences, len(checked))
         pattern = alphabet._index_of.get(checked)
@@ -275,6 +292,8 @@ class Evidence:
             likelihood[pattern] = 1.0
             evidence = cls(likelihood, pattern, checked, stated)
             vars(evidence)["_range"] = (0.0, 1.0, 1.0)  # spares looking for it: most looks are such
+            if not stated and len(alphabet) <= _MOST_KEPT:
+                alphabet._whole_looks[checked] = evidence
             return evidence
         agrees = np.ones(len(alphabet), dtype=bool)
         for slot, symbol in enumerate(checked):

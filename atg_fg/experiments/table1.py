@@ -121,10 +121,11 @@ def run_test(
             for trial in log.resume() if resume else log.begin():
                 _learn_and_score(trial, memory, plan, score)
                 step_done()
-        for number in range(score.n_trials, plan.n_trials):
+        first = score.n_trials
+        for number in range(first, plan.n_trials):
             inference = begin_trial(plan.engine, memory, plan.parameters)
             rng = np.random.default_rng(trial_seeds[number])
-            record = run_trial(world, inference, policy, plan.n_actions, rng)
+            record = run_trial(world, inference, policy, plan.n_actions, rng, is_checked=number > first)
             smoothed = _smoothed(inference, record) if plan.smoothed_learning else None
             trial = TrialSummary.of(record, learned_patterns=smoothed)
             trial = replace(trial, mended=_learn_and_score(trial, memory, plan, score))

@@ -190,7 +190,7 @@ def step(
             that of the pattern learned now.
     """
     n_known, pattern = tables[0], tables[1]
-    n_aspects, n_patterns, _, delta = constants
+    _, n_patterns, _, delta = constants
     aspects, log_identity, identity = belief
     n_hypotheses = len(n_known)
     if action != REST:

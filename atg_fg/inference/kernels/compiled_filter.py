@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Final
 
 import numpy as np
 
@@ -70,14 +69,13 @@ class CompiledFilter:
         Returns:
             ln p(z_t | z_0:t-1), or −∞ with nothing changed.
         """
-        learned = (-1, 0, -1, -1)
-        if self._learns and seen[2] is not None:
+        learned, (before, action, pattern) = (-1, 0, -1, -1), seen
+        if self._learns and pattern is not None:
             if self._n_learned == self._room:
                 self._make_room()
             self._n_learned += 1
-            before, action, pattern = seen
-            counted = before is not None and action is not None
-            learned = (before if counted else -1, action if counted else 0, pattern, self._shown_pattern)
+            counted = (-1, 0) if before is None or action is None else (before, action)
+            learned = (*counted, pattern, self._shown_pattern)
         belief = (self._aspects, self._log_identity, self.identity)
         log_probability = kernels.step(
             self._arrays, self._numbers, belief, self._action, likelihood, learned, self._shown

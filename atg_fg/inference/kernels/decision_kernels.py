@@ -17,9 +17,6 @@ from atg_fg.inference.kernels.compilation import compiled, reordered
 #: Smallest normal number, in place of zero under a logarithm: x ln x of what is below it is zero up to rounding.
 _LEAST: Final = float(np.finfo(np.float64).tiny)
 
-#: What all that is less probable adds, of a million hypotheses, is below the rounding of the sum.
-_NEGLIGIBLE: Final = 1e-24
-
 #: Values of an action in a block: they stay in the processor's nearest cache until their logarithms are taken.
 _BLOCK: Final = 256
 
@@ -37,9 +34,9 @@ def logarithm(number: float) -> float:
     It has no branches, and is no call of a library, so that a loop takes many at once. With number = 2^e m, m from √½
     to √2, it is e ln 2 + 2 (s + s³/3 + s⁵/5 + …), s = (m − 1) / (m + 1).
     """
-    bits = np.float64(number).view(np.int64)  # type: ignore[attr-defined]
+    bits = np.float64(number).view(np.int64)
     exponent = (bits - _ROOT_OF_HALF) >> _MANTISSA
-    mantissa = np.int64(bits - (exponent << _MANTISSA)).view(np.float64)  # type: ignore[attr-defined]
+    mantissa = np.int64(bits - (exponent << _MANTISSA)).view(np.float64)
     root = (mantissa - 1.0) / (mantissa + 1.0)
     square = root * root
     series = 1.0 / 19.0
@@ -104,8 +101,6 @@ def expected_entropies(
     others, weights, n_others = np.empty((n_actions, _BLOCK)), np.empty((n_actions, _BLOCK)), 0
     for hypothesis in range(n_hypotheses):
         probability = identity[hypothesis]
-        if probability < _NEGLIGIBLE:
-            continue
         n_own = n_known[hypothesis]
         noise = delta / n_patterns * probability
         rate = 0.0

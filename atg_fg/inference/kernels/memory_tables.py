@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import threading
 import weakref
+from copy import deepcopy
 from typing import Any, Final, NamedTuple
 
 import numpy as np
 
+from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.compact.columns import positions
 from atg_fg.core.memory import RobotMemory
-from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.patterns import FloatArray
 from atg_fg.inference.kernels.belief_kernels import Tables, write_row
 
@@ -110,7 +111,7 @@ class MemoryTables:
             self._make(graphs)
             return
         if len(self._readers):  # they go on with the tables as they were
-            self._tables = Tables(*(array.copy() for array in self._tables))
+            self._tables = deepcopy(self._tables)
             self._readers.clear()
         for number in changed:
             self._write(number, graphs[number])
