@@ -6,25 +6,18 @@ This module loads Numba.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.inference.kernels.belief_kernels import (
-    Constants,
-    Tables,
-    condition,
-    learn,
-    predict,
-    spread_by_base,
-    weigh,
-)
+from atg_fg.inference.kernels.belief_kernels import BEGIN, step, weigh_all
 from atg_fg.inference.kernels.compilation import compiled
 
 
 @compiled
 def log_evidence_of_each(
-    tables: Tables,
+    tables: tuple[Any, ...],
     sizes: tuple[int, int],
     grid: FloatArray,
     evidence: FloatArray,
@@ -34,45 +27,30 @@ def log_evidence_of_each(
     """Return ln p(trial | hypothesis, α, δ), learned as the trial goes, shape [N, H].
 
     Args:
-        tables: What H hypotheses know, with room for what the trial finds; not changed.
+        tables: What H hypotheses know, with room for what the trial finds, ``Tables``; not changed.
         sizes: |G| and |𝒵|.
         grid: α and δ, shape [N, 2].
         evidence: Likelihood of each pattern at each look, shape [T + 1, |𝒵|].
         actions: Between the looks, shape [T].
         patterns: Pattern of each look, −1 if it was not complete, shape [T + 1].
     """
-    n_rows, width = tables.pattern.shape
-    everyone = np.arange(n_rows)
+    n_known, pattern, begins, edges, counted, probability = tables
+    n_rows, width = pattern.shape
     result = np.empty((len(grid), n_rows))
-    aspects, following = np.zeros((n_rows, width)), np.zeros((n_rows, width))
-    log_identity, log_updated, identity = np.zeros(n_rows), np.zeros(n_rows), np.zeros(n_rows)
+    aspects, log_identity, identity = np.zeros((n_rows, width)), np.zeros(n_rows), np.zeros(n_rows)
     for number in range(len(grid)):
-        own = Tables(
-            tables.n_known.copy(),
-            tables.pattern.copy(),
-            tables.edge_start,
-            tables.n_edges.copy(),
-            tables.edges.copy(),
-            tables.counted.copy(),
-            tables.probability.copy(),
-            tables.prior_weight.copy(),
-        )
-        constants = Constants(sizes[0], sizes[1], grid[number, 0], grid[number, 1])
-        weigh(own, everyone, constants.concentration)
-        spread_by_base(own, constants, aspects)
+        own = (n_known.copy(), pattern.copy(), begins.copy(), edges.copy(), counted.copy(), probability.copy())
+        constants = (sizes[0], sizes[1], grid[number, 0], grid[number, 1])
+        weigh_all(own, constants[2])
         log_identity[:] = 0.0
-        total = 0.0
+        total, shown, shown_pattern = 0.0, np.zeros_like(n_known), -1
         for time in range(len(evidence)):
-            if time > 0:
-                predict(own, constants, aspects, actions[time - 1], following)
-                aspects, following = following, aspects
-            total += condition(own, constants, evidence[time], aspects, log_identity, following, log_updated, identity)
-            aspects, following = following, aspects
-            log_identity, log_updated = log_updated, log_identity
+            action = actions[time - 1] if time > 0 else BEGIN
+            counted_from = patterns[time - 1] if time > 0 else -1
+            learned = (counted_from, max(action, 0), patterns[time], shown_pattern)
+            total += step(own, constants, (aspects, log_identity, identity), action, evidence[time], learned, shown)
             if patterns[time] >= 0:
-                counted = time > 0 and patterns[time - 1] >= 0
-                previous, action = (patterns[time - 1], actions[time - 1]) if counted else (-1, 0)
-                learn(own, constants, aspects, previous, action, patterns[time])
+                shown_pattern = patterns[time]
         result[number] = log_identity + total
     return result
 

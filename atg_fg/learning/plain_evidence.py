@@ -98,14 +98,14 @@ class PlainEvidence:
         self, graphs: Sequence[AspectTransitionGraph], looks: Sequence[Evidence], actions: Sequence[int]
     ) -> FloatArray:
         """Return ln p(trial | ATG), and last of an object never met, shape [1 + N, len(graphs) + 1]."""
-        from atg_fg.inference.kernels.memory_tables import arrays_for_trial, with_more_room
+        from atg_fg.inference.kernels.memory_tables import MemoryTables, with_more_room
         from atg_fg.learning import kind_kernels  # they load Numba
 
         memory = RobotMemory(self._assumptions, graphs)
-        tables = with_more_room(arrays_for_trial(memory, 1.0, self).tables, len(looks) + 1, self._assumptions.n_aspects)
+        tables = with_more_room(MemoryTables(memory, 1.0).current, len(looks) + 1, self._assumptions.n_aspects)
         patterns: IntArray = np.array([-1 if look.pattern is None else look.pattern for look in looks])
         result: FloatArray = kind_kernels.log_evidence_of_each(
-            tables,
+            tuple(tables),
             (self._assumptions.n_aspects, len(self._assumptions.alphabet)),
             np.array([SURE, *UNCERTAIN]),
             np.array([look.likelihood for look in looks]),

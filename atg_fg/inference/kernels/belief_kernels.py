@@ -85,9 +85,22 @@ def write_row(
     for row in range(len(counts)):
         source, target = counts[row, 0] + 1, counts[row, 2] + 1
         _count((edges, counted, probability), own, source, counts[row, 1], target, float(counts[row, 3]))
-    for action in range(len(own) - 1):
-        for edge in range(own[action], own[action + 1]):
-            _weigh((edges, counted, probability), own, edges[edge, 1], action, concentration)
+    _weigh_own((edges, counted, probability), own, concentration)
+
+
+@compiled
+def weigh_all(tables: tuple[Any, ...], concentration: float) -> None:
+    """Set what the counts of all rows of all hypotheses come to."""
+    _, _, begins, edges, counted, probability = tables
+    for hypothesis in range(len(begins)):
+        _weigh_own((edges, counted, probability), begins[hypothesis], concentration)
+
+
+@compiled
+def _weigh_own(edges: Edges, begins: IntArray, concentration: float) -> None:
+    for action in range(len(begins) - 1):
+        for edge in range(begins[action], begins[action + 1]):
+            _weigh(edges, begins, edges[0][edge, 1], action, concentration)
 
 
 @compiled

@@ -67,6 +67,11 @@ class MemoryTables:
         self._readers: weakref.WeakSet[Any] = weakref.WeakSet()
         self._make(list(memory))
 
+    @property
+    def current(self) -> Tables:
+        """The tables as they were last brought up to date; not to be written to, and to be copied if they are kept."""
+        return _part(self._tables, len(self._revisions) + 1, self._n_edges)
+
     def lend(self, memory: RobotMemory, trial: object, *, extends: bool) -> TrialArrays:
         """Return the tables of the memory as it is now.
 
@@ -82,7 +87,7 @@ class MemoryTables:
             weakref.finalize(trial, self._take_back, lent).atexit = False
             if not extends:
                 self._readers.add(trial)
-                return TrialArrays(_part(self._tables, n_rows, self._n_edges), lent.aspects[:n_rows])
+                return TrialArrays(self.current, lent.aspects[:n_rows])
             tables = _part(lent.tables, n_rows, self._n_edges + ROOM)
             for own, array in zip(tables, self._tables, strict=True):
                 own[...] = array[: len(own)]
