@@ -23,6 +23,7 @@ app = typer.Typer(
 )
 
 Condition = Annotated[str, typer.Option(help="What the robot works under: nominal or worn.")]
+Pictures = Annotated[bool, typer.Option("--pictures", help="Boxes with pictures in place of cubes with tags.")]
 Actions = Annotated[int, typer.Option(min=1, help="Number of random actions.")]
 
 
@@ -33,9 +34,7 @@ def reliability(
     stations: Annotated[
         int, typer.Option(min=1, help="Cubes in the scene; the robot goes to a random one each time.")
     ] = 1,
-    pictures: Annotated[
-        bool, typer.Option("--pictures", help="Boxes with pictures in place of cubes with tags.")
-    ] = False,
+    pictures: Pictures = False,
     seed: Annotated[int, typer.Option(min=0, help="Seed of cubes, actions and circumstances.")] = 0,
     urdf: options.Urdf = None,
     jobs: options.Jobs = None,
@@ -99,6 +98,7 @@ def picture(
     table: Annotated[
         Path | None, typer.Option(writable=True, help="Write a picture of the robot before three cubes, PNG.")
     ] = None,
+    pictures: Pictures = False,
     seed: Annotated[int, typer.Option(min=0, help="Seed of the cubes.")] = 0,
     urdf: options.Urdf = None,
 ) -> None:
@@ -111,9 +111,9 @@ def picture(
     for file in (output, table):
         if file is not None:
             figures.check_figure_path(file)
-    figures.save_image(draw_flip(seed, urdf), output)
+    figures.save_image(draw_flip(seed, urdf, boxes=pictures), output)
     if film is not None:
-        figures.save_film(*draw_actions(seed, urdf), film)
+        figures.save_film(*draw_actions(seed, urdf, boxes=pictures), film)
     if table is not None:
         figures.save_image(draw_table(seed, urdf), table)
     say(f"saved: {', '.join(str(file) for file in (output, film, table) if file is not None)}")

@@ -1,10 +1,10 @@
-"""Pictures for people: the robot as it flips a cube, a film of its three actions, and the robot before three cubes."""
+"""Pictures for people: the robot as it turns a cube or a box, as a strip and a film, and before three cubes."""
 
 from __future__ import annotations
 
 from contextlib import closing
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,6 +14,8 @@ from atg_fg.worlds.arcube import ACTION_SOURCES
 from sim.vision.camera import Camera
 from sim.worlds.film import observed
 from sim.worlds.robonaut_arcube_world import RobonautARcubeWorld
+from sim.worlds.robonaut_picture_box_world import RobonautPictureBoxWorld
+from sim.worlds.robonaut_world import RobonautWorld
 from sim.worlds.scene import Scene
 from sim.worlds.stations_world import RobonautTableWorld
 
@@ -34,10 +36,16 @@ _MIDDLE: Final = 1  # the station
 _GAP: Final = 4  # pixels
 
 
-def draw_flip(seed: int = 0, urdf: Path | None = None) -> NDArray[np.uint8]:
-    """Return a flip as four pictures side by side, RGB, shape [height, width, 3]: grasp, two of the turn, the end."""
+def draw_flip(seed: int = 0, urdf: Path | None = None, *, boxes: bool = False) -> NDArray[np.uint8]:
+    """Return a flip as four pictures side by side, RGB, shape [height, width, 3]: grasp, two of the turn, the end.
+
+    Args:
+        seed: Of what is turned.
+        urdf: A user's own description of the robot.
+        boxes: Whether that is a box with pictures, not a cube with tags.
+    """
     pictures: list[NDArray[np.uint8]] = []
-    with closing(RobonautARcubeWorld(urdf=urdf)) as world:
+    with closing(_world(boxes, urdf=urdf)) as world:
         world.reset(seed=seed)
         _, before = world.scene.cube.pose()
 
@@ -61,9 +69,11 @@ def draw_flip(seed: int = 0, urdf: Path | None = None) -> NDArray[np.uint8]:
     return np.concatenate(row[:-1], axis=1)
 
 
-def draw_actions(seed: int = 0, urdf: Path | None = None) -> tuple[list[NDArray[np.uint8]], int]:
-    """Return a film of flip, left and right as RGB pictures, and how many there are a second."""
-    with closing(RobonautARcubeWorld(urdf=urdf, render_mode="rgb_array_list")) as world:
+def draw_actions(
+    seed: int = 0, urdf: Path | None = None, *, boxes: bool = False
+) -> tuple[list[NDArray[np.uint8]], int]:
+    """Return a film of flip, left and right as RGB pictures, and how many there are a second; as for ``draw_flip``."""
+    with closing(_world(boxes, urdf=urdf, render_mode="rgb_array_list")) as world:
         world.reset(seed=seed)
         for action in range(len(ACTION_SOURCES)):
             world.step(np.int64(action))
@@ -85,6 +95,10 @@ def draw_table(seed: int = 0, urdf: Path | None = None) -> NDArray[np.uint8]:
         world.scene.on_step = shoot_if_turned
         world.step(np.int64(list(ACTION_SOURCES).index("flip")))
         return pictures[0] if pictures else observed(world.scene, _ACROSS)
+
+
+def _world(boxes: bool, **options: Any) -> RobonautWorld:
+    return RobonautPictureBoxWorld(**options) if boxes else RobonautARcubeWorld(**options)
 
 
 def _has_turned(scene: Scene, before: FloatArray, degrees: float) -> bool:

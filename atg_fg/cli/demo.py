@@ -31,13 +31,13 @@ from atg_fg.worlds.base import World
 from atg_fg.worlds.registry import assumptions_of, check_arcube_world, make_world, sense_of
 
 N_REMEMBERED = 6
-#: The world of boxes without tags, in which the robot itself learns what it remembers.
-PICTURE_BOXES: Final = "picture-box"
+#: Boxes without tags, before the robot and before a rendered camera, where the robot learns what it remembers.
+PICTURE_BOXES, RENDERED_BOXES = "robonaut-picture-box", "picture-box"
 #: Options of the worlds that have a camera: its last frame is saved, or a film of the trial.
 CAMERAS: Final[dict[str, dict[str, Any]]] = {
     "rendered": {"render_mode": "detections", "image_size": (640, 480)},
     "robonaut": {"render_mode": "rgb_array_list"},
-    PICTURE_BOXES: {"render_mode": "detections"},
+    PICTURE_BOXES: {"render_mode": "rgb_array_list"},
 }
 
 
@@ -57,11 +57,13 @@ def demo(
 ) -> None:
     """Let the robot recognise one of the objects it remembers by turning it over, told step by step.
 
-    The memory is learned beforehand, from the same objects turned at random in the ideal world, or in that of boxes
-    without tags. With a camera, the last frame is saved, or a film of the robot.
+    The memory is learned beforehand, from the same objects turned at random in the ideal world, or before a rendered
+    camera if they are boxes without tags. With a camera, the last frame is saved, or a film of the robot.
 
     Example: atg-fg demo --seed 1 --novel
     """
+    if world == RENDERED_BOXES:
+        world = PICTURE_BOXES
     if world != PICTURE_BOXES:
         check_arcube_world("--world", world)
     options.check_json_option(json_file)
@@ -83,7 +85,8 @@ def demo(
         console.print(f"The robot remembers {N_REMEMBERED} {things} that it turned over before.")
         rng = np.random.default_rng(learn_seed)
         if world == PICTURE_BOXES:
-            memory = learn_boxes_beforehand(made_world, parameters, rng)
+            with closing(make_world(RENDERED_BOXES, **own)) as rendered:
+                memory = learn_boxes_beforehand(rendered, parameters, rng)
         else:
             memory = learn_beforehand(cubes, parameters, rng)
         rng = np.random.default_rng(trial_seed)

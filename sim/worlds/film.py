@@ -45,8 +45,8 @@ def observed(scene: Scene, camera: Camera) -> NDArray[np.uint8]:
 
 def with_inset(picture: NDArray[np.uint8], inset: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Return a picture with a smaller one in its upper left corner."""
-    width = int(picture.shape[1] * _INSET_SHARE)
-    height = width * inset.shape[0] // inset.shape[1]
+    height = int(picture.shape[0] * _INSET_SHARE)
+    width = height * inset.shape[1] // inset.shape[0]
     rows = (np.arange(height) * inset.shape[0]) // height
     columns = (np.arange(width) * inset.shape[1]) // width
     both = picture.copy()

@@ -1,6 +1,8 @@
 import json
 import os
 
+import pytest
+
 from atg_fg.storage import memory_files
 
 
@@ -29,6 +31,19 @@ def test_the_demo_recognises_an_object_from_camera_images(run, tmp_path):
     ]
     assert len(os.listdir(tmp_path / "out" / "trial.frames")) == 6
     assert len(memory_files.load_memory(tmp_path / "out" / "memory.json")) == 6
+
+
+@pytest.mark.slow
+def test_the_robot_recognises_a_box_whose_pictures_it_met_before_a_rendered_camera(run, tmp_path):
+    for world in ("picture-box", "robonaut-picture-box"):
+        out = tmp_path / world
+        status, output, error = run("demo", "--world", world, "--output", out, "--actions", "3")
+        assert (status, error) == (0, "")
+        assert "remembers 6 boxes" in output
+        verdict = output.split("verdict: ")[1].split(" ")[0]
+        assert f"truth:   {verdict}" in output
+        assert (out / "film.gif").read_bytes().startswith(b"GIF89a")
+        assert len(os.listdir(out / "trial.frames")) == 4
 
 
 def test_the_demo_tells_a_new_object(run, tmp_path):

@@ -41,6 +41,18 @@ def test_pictures_and_a_film_are_written(run, tmp_path):
     assert film.read_bytes().startswith(b"GIF89a")
 
 
+@pytest.mark.slow
+def test_boxes_with_pictures_are_filmed_and_counted(run, refused, tmp_path):
+    picture, film = tmp_path / "robot.png", tmp_path / "robot.gif"
+    status, _, error = run("sim", "picture", "--pictures", "--output", picture, "--film", film)
+    assert (status, error) == (0, "")
+    assert film.read_bytes().startswith(b"GIF89a")
+    status, output, error = run("sim", "reliability", "--pictures", "--actions", "2", "--jobs", "1", "--json", "-")
+    assert (status, json.loads(output)["parameters"]["pictures"]) == (0, True)
+    (tmp_path / "boxes.json").write_text(output)
+    assert "detection.both.of is missing" in refused("sim", "calibrate", tmp_path / "boxes.json")
+
+
 def test_bad_options_are_refused(refused, tmp_path):
     assert "condition: unknown name 'new'" in refused("sim", "reliability", "--condition", "new")
     assert "'--actions': Input should be greater than or equal to 1" in refused("sim", "reliability", "--actions", 0)
