@@ -149,6 +149,8 @@ results-robot: $(READY)  ## Run the experiments on the simulated robot (about an
 	done
 	$(BIN)/atg-fg sim picture --output docs/images/robonaut.png --film docs/images/robonaut.gif \
 		--table docs/images/robonaut_table.png
+	$(BIN)/atg-fg sim picture --pictures --seed 18 --output docs/images/robonaut_pictures.png \
+		--film docs/images/robonaut_pictures.gif
 
 # The goal experiment: in the ideal world with 200 runs each, then on the robot with a record of every run.
 GOAL := goal --engine bayes-filter
