@@ -15,6 +15,8 @@ from sim.manipulation.impedance_control import TIME_STEP
 #: One of so many steps is looked at.
 _EVERY: Final = 4
 _GRAVITY: Final = 9.81  # m/s²
+#: Seed of what the robot's sensors were built with.
+_THE_ROBOTS: Final = 1
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,14 +34,13 @@ class TorqueSensors:
     noise: float
 
     @classmethod
-    def drawn(
-        cls, rng: np.random.Generator, offset: float = 0.5, gain: float = 0.01, noise: float = 0.5
-    ) -> TorqueSensors:
-        """Return sensors whose offsets (N·m) and gains differ with these standard deviations.
+    def drawn(cls, rng: np.random.Generator) -> TorqueSensors:
+        """Return the sensors of the robot as they are in one trial: gains stay, offsets drift from trial to trial.
 
-        Half a newton metre is half a percent of the limit of the robot's joints.
+        They differ by 1 %, and by half a newton metre, which is half a percent of the limit of the robot's joints.
         """
-        return cls(rng.normal(0.0, offset, (2, 7)), rng.normal(1.0, gain, (2, 7)), noise)
+        gains = np.random.default_rng(_THE_ROBOTS).normal(1.0, 0.01, (2, 7))
+        return cls(rng.normal(0.0, 0.5, (2, 7)), gains, noise=0.5)
 
     def sensed(self, torques: FloatArray, rng: np.random.Generator) -> FloatArray:
         """Return what is sensed of torques, both of shape [steps, 2, 7], N·m."""

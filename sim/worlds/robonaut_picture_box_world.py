@@ -27,7 +27,7 @@ _SIZE_TOLERANCE: Final = 0.03
 #: What the table's colours sum up to in usual light, grey levels.
 _USUAL_TABLE: Final = 255 * sum(WOOD[:3]) * Light().on_top
 #: What a snapshot of this world has more than others.
-_KEPT: Final = ("depth", "box", "crops", "seen", "weighed")
+_KEPT: Final = ("depth", "box", "crops", "seen", "weighed", "_feeling")
 
 
 class RobonautPictureBoxWorld(RobonautWorld, BoxesWithPictures):
@@ -86,7 +86,9 @@ class RobonautPictureBoxWorld(RobonautWorld, BoxesWithPictures):
     def _place(self) -> None:
         super()._place()
         self.weighed = None
-        self.scales = Scales(self.scene.robot, TorqueSensors.drawn(self.np_random))
+        # Of its own, so that what is felt changes nothing of what is seen.
+        self._feeling = np.random.default_rng(self.np_random.integers(2**63))
+        self.scales = Scales(self.scene.robot, TorqueSensors.drawn(self._feeling))
 
     def _try(self, action: str) -> bool:
         self.scales.clear()
@@ -98,9 +100,9 @@ class RobonautPictureBoxWorld(RobonautWorld, BoxesWithPictures):
     def _feel(self, angles: FloatArray, velocities: FloatArray, torques: FloatArray) -> None:
         """Weigh the box while it is in the air, from rest to rest."""
         if self.manipulator.phase == "approach":
-            self.scales.tare(angles, velocities, torques, self.np_random)
+            self.scales.tare(angles, velocities, torques, self._feeling)
         elif self.manipulator.phase == "turn":
-            self.scales.feel(angles, velocities, torques, self.np_random)
+            self.scales.feel(angles, velocities, torques, self._feeling)
 
     def _perceive(self) -> None:
         camera = self.camera.moved(self.scene.robot.place)
