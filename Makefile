@@ -41,7 +41,7 @@ without_samples = rm -rf $(VENV)/lib/python3*/site-packages/pybullet_data
 $(READY): pyproject.toml
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --upgrade 'pip>=25.1'
-	$(BIN)/python -m pip install --quiet --editable '.[sim,vision,viz,print,report,viewer,ros,notebooks]' \
+	$(BIN)/python -m pip install --quiet --editable '.[sim,vision,viz,print,report,viewer,ros,minari,notebooks]' \
 		--group test --group dev --group docs
 	$(without_samples)
 	touch $@

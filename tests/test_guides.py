@@ -181,9 +181,10 @@ def test_the_guide_to_webcams_comes_to_the_verdicts_that_it_tells(webcam_guide):
 
 @pytest.mark.slow
 def test_the_guides_to_ones_own_data_print_what_they_say(tmp_path, monkeypatch):
-    for needed in ("numba", "jinja2"):
+    for needed in ("numba", "jinja2", "minari", "h5py"):
         pytest.importorskip(needed)
     monkeypatch.syspath_prepend(DOCS)
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(tmp_path / "datasets"))
     import tour
 
     shown = [*blocks("your_data.md", "console"), *blocks("noisy_detectors.md", "console")]

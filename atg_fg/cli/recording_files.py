@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Literal
 
 import typer
 
@@ -14,6 +14,7 @@ from atg_fg.core.errors import InvalidInputError
 from atg_fg.experiments.simulated_recording import simulated_recording
 from atg_fg.storage import plain_files
 from atg_fg.storage.bag_process import read_bag
+from atg_fg.storage.minari_recordings import read_minari, write_minari
 from atg_fg.storage.recordings import check_recording, completed, read_recording, write_recording
 from atg_fg.storage.rosbag_recordings import is_bag, read_topics
 
@@ -69,12 +70,20 @@ def check(
 
 @app.command()
 def convert(
-    file: Annotated[Path, typer.Argument(help="A recording, CSV or JSON lines; or a bag of ROS.", show_default=False)],
+    file: Annotated[
+        Path,
+        typer.Argument(
+            help="A recording, CSV or JSON lines; a bag of ROS; or the name of a dataset.", show_default=False
+        ),
+    ],
     output: Annotated[
         Path, typer.Option("--output", "-o", writable=True, help=".jsonl or .csv to write.", show_default=False)
     ],
     topics: Annotated[
         Path | None, typer.Option(help="JSON file that says in which topics of a bag labels and actions are.")
+    ] = None,
+    source: Annotated[
+        Literal["minari"] | None, typer.Option("--from", help="What FILE is the name of a dataset of.")
     ] = None,
     objects: Objects = None,
     aspects: Aspects = None,
@@ -86,12 +95,15 @@ def convert(
 ) -> None:
     """Write a recording as JSON lines, which also hold what a table does not say, or as CSV.
 
-    A bag of ROS 2 (rosbag2, MCAP) or ROS 1 is read with `--topics`. (Extra `ros`.)
+    A bag of ROS 2 (rosbag2, MCAP) or ROS 1 is read with `--topics`. (Extra `ros`.) A dataset of Minari is read with
+    `--from minari`. (Extra `minari`.)
 
     Example: atg-fg recordings convert looks.csv -o looks.jsonl --objects 8
     """
     given = given_spec(spec, slots, actions, labels, objects, aspects, exclusive)
-    if topics is not None:
+    if source == "minari":
+        recording = completed(read_minari(str(file)), given)
+    elif topics is not None:
         recording = completed(read_bag(file, read_topics(topics)), given)
     elif is_bag(file):
         raise InvalidInputError(f"{file}: a bag; expected --topics FILE, which says where labels and actions are")
@@ -99,6 +111,34 @@ def convert(
         recording = read_recording(file, given)
     write_recording(recording, output)
     say(f"saved: {output}")
+
+
+@app.command()
+def export(
+    file: Annotated[Path, typer.Argument(help="A recording: CSV or JSON lines.", show_default=False)],
+    name: Annotated[str, typer.Option(help="Of the new dataset, such as robot/looks-v0.", show_default=False)],
+    to: Annotated[Literal["minari"], typer.Option(help="What it is written for.")] = "minari",
+    objects: Objects = None,
+    aspects: Aspects = None,
+    slots: Slots = None,
+    actions: Actions = None,
+    labels: Labels = None,
+    exclusive: Exclusive = None,
+    spec: Spec = None,
+) -> None:
+    """Write a recording as a dataset of Minari, for offline reinforcement learning.
+
+    It goes where Minari keeps its datasets. (Extra `minari`.)
+
+    `recordings convert NAME --from minari` reads it back.
+
+    Example: atg-fg recordings export looks.csv --to minari --name robot/looks-v0
+    """
+    recording = read_recording(file, given_spec(spec, slots, actions, labels, objects, aspects, exclusive))
+    folder, left_out = write_minari(recording, name)
+    say(f"saved: {folder}")
+    if left_out:
+        say(f"left out: {left_out} trials without an action")
 
 
 @app.command()

@@ -174,15 +174,31 @@ def _of_lines(text: str, place: str, spec: RecordingSpec) -> Recording:
     header = parse_json(lines[0], head)
     if not isinstance(header, dict) or "format" not in header:
         raise InvalidInputError(f"{head}: {brief(header)}; expected a header with format {RECORDING_FORMAT!r}")
+    trials = (
+        (f"{place}: line {index}", parse_json(line, f"{place}: line {index}"))
+        for index, line in enumerate(lines[1:], 2)
+    )
+    return recording_of(header, head, trials, place, spec)
+
+
+def recording_of(
+    header: Any, head: str, documents: Iterable[tuple[str, Any]], place: str, spec: RecordingSpec
+) -> Recording:
+    """Return the recording in a header and trials as JSON knows them.
+
+    Args:
+        header: What is said of all trials.
+        head: Where that stands, for error messages.
+        documents: Each trial, with its place.
+        place: Of the recording.
+        spec: What it does not say itself, or says otherwise.
+    """
     check_format({"version": None, **header}, RECORDING_FORMAT, head)
     own = {name: value for name, value in header.items() if name not in ("format", "version")}
     spec = merged_spec(spec, _spec(own, head, ("slots",)))
-    trials = [
-        _read_trial(parse_json(line, f"{place}: line {index}"), f"{place}: line {index}", spec)
-        for index, line in enumerate(lines[1:], 2)
-    ]
+    trials = [_read_trial(document, where, spec) for where, document in documents]
     if not trials:
-        raise InvalidInputError(f"{place}: line 2: no trials; expected at least one")
+        raise InvalidInputError(f"{head}: no trials after it; expected at least one")
     name, times = Counter(trial.name for trial in trials).most_common(1)[0]
     if times > 1:
         raise InvalidInputError(f"{place}: trial {name!r} is repeated; expected unique names of trials")
@@ -246,7 +262,13 @@ def _read_look(value: Any, sure: Any, slots: tuple[str, ...], place: str, spec: 
 
 
 def _to_lines(recording: Recording) -> str:
-    header = without_none(
+    lines = [header_of(recording), *map(trial_document, recording.trials)]
+    return "".join(f"{json.dumps(line)}\n" for line in lines)
+
+
+def header_of(recording: Recording) -> dict[str, Any]:
+    """Return what is said of all trials as JSON knows it."""
+    return without_none(
         {
             "format": RECORDING_FORMAT,
             "version": 1,
@@ -258,10 +280,10 @@ def _to_lines(recording: Recording) -> str:
             "exclusive": recording.exclusive or None,
         }
     )
-    return "".join(f"{json.dumps(line)}\n" for line in [header, *map(_trial_line, recording.trials)])
 
 
-def _trial_line(trial: RecordedTrial) -> dict[str, Any]:
+def trial_document(trial: RecordedTrial) -> dict[str, Any]:
+    """Return a trial as JSON knows it."""
     looks = [
         [
             dict(look.weights[slot] or {}) if look.weights and look.weights[slot] else label

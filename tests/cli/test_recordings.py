@@ -1,6 +1,7 @@
 """Recordings of a user's own on the command line: looked at, learned from, recognised, shown."""
 
 import json
+import sys
 from itertools import pairwise
 
 import numpy as np
@@ -123,6 +124,25 @@ def test_a_recording_is_converted_there_and_back(run, folder):
     run("recordings", "convert", "first.jsonl", "-o", "again.csv")
     assert (folder / "again.csv").read_text() == (folder / "first.csv").read_text()
     assert json.loads((folder / "first.jsonl").read_text().split("\n")[0])["objects"] == 3
+
+
+def test_a_recording_goes_to_minari_and_back(run, refused, folder, monkeypatch):
+    pytest.importorskip("h5py", reason="Minari is not installed: pip install atg-fg[minari]")
+    monkeypatch.setenv("MINARI_DATASETS_PATH", str(folder / "datasets"))
+    status, output, _ = run("recordings", "export", "first.csv", "--to", "minari", "--name", "robot/cups-v0")
+    assert (status, output.splitlines()) == (0, [f"saved: {folder / 'datasets' / 'robot' / 'cups-v0'}"])
+    run("recordings", "convert", "robot/cups-v0", "--from", "minari", "-o", "again.csv")
+    assert (folder / "again.csv").read_text() == (folder / "first.csv").read_text()
+    assert "there is such a dataset" in refused("recordings", "export", "first.csv", "--name", "robot/cups-v0")
+
+
+def test_without_minari_its_extra_is_named(refused, folder, monkeypatch):
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    for arguments in (
+        ["export", "first.csv", "--name", "a-v0"],
+        ["convert", "a-v0", "--from", "minari", "-o", "a.csv"],
+    ):
+        assert refused("recordings", *arguments).endswith('expected it from: pip install "atg-fg[minari]"\n')
 
 
 @pytest.mark.parametrize(

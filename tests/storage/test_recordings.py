@@ -184,7 +184,7 @@ def test_a_fault_is_one_line_that_says_where_and_what_was_expected(written, chan
         (b"trial,step,action,label\n0,0,,\xff\n", "not UTF-8"),
         ("{", "line 1: not valid JSON"),
         ('{"format": "other"}', "format: 'other'; expected 'atg-fg/recording'"),
-        ('{"format": "atg-fg/recording", "version": 1, "slots": ["a"]}', "line 2: no trials"),
+        ('{"format": "atg-fg/recording", "version": 1, "slots": ["a"]}', "line 1: no trials after it"),
     ],
 )
 def test_what_is_no_recording_is_refused(written, text, message):
