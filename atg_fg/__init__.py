@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from atg_fg.core.errors import AtgError
     from atg_fg.core.goals import Goal
     from atg_fg.core.memory import RobotMemory
+    from atg_fg.core.object_sense import ObjectSense
     from atg_fg.core.parameters import ModelParameters
     from atg_fg.core.patterns import Evidence, PatternAlphabet
     from atg_fg.core.records import TrialRecord
@@ -72,6 +73,7 @@ __all__ = [
     "Inference",
     "JointRecognitionGraph",
     "ModelParameters",
+    "ObjectSense",
     "PatternAlphabet",
     "RecognitionAgent",
     "RecognitionEnv",

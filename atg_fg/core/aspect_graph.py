@@ -12,8 +12,9 @@ import numpy as np
 from atg_fg.core.assumptions import MAX_NUMBER, Assumptions
 from atg_fg.core.checks import whole_number
 from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.object_sense import Moments, check_measured
 from atg_fg.core.open_alphabets import Relabelling
-from atg_fg.core.patterns import IntArray, Pattern
+from atg_fg.core.patterns import IntArray, Measured, Pattern
 from atg_fg.core.table import Cell, Table, shortened
 
 #: Node of the networkx view that stands for all unobserved aspects.
@@ -45,7 +46,30 @@ class AspectTransitionGraph:
         self._aspect_of: dict[int, int] = {}
         self._counts: dict[Edge, int] = {}
         self._count_table: IntArray | None = None
+        self._measured: dict[str, Moments] = {}
         self.revision = next(_revisions)
+
+    @property
+    def measured(self) -> dict[str, Moments]:
+        """What is kept of all readings of the object, by the name of the sense that they are of."""
+        return dict(self._measured)
+
+    def measure(self, measured: Measured) -> None:
+        """Add readings of the object as a whole.
+
+        Raises:
+            InvalidInputError: There is no such sense, or a reading is none of it.
+        """
+        senses = {sense.name: sense for sense in self.assumptions.object_senses}
+        for name, reading in measured:
+            check_measured(tuple(senses.values()), {name: reading}, f"{self.name}: measured")
+            self.add_moments(name, senses[name].moments_of([reading]))
+
+    def add_moments(self, name: str, moments: Moments) -> None:
+        """Add what is kept of some readings of a sense; none of them is no entry."""
+        if moments.count:
+            self._measured[name] = self._measured.get(name, Moments()).plus(moments)
+            self.revision = next(_revisions)
 
     @property
     def n_known(self) -> int:
@@ -168,11 +192,13 @@ class AspectTransitionGraph:
         """Return the same graph under assumptions with another alphabet."""
         graph = AspectTransitionGraph(self.name, assumptions)
         graph._aspect_of = {int(labels.indices[pattern]): aspect for pattern, aspect in self._aspect_of.items()}
-        graph._counts = dict(self._counts)
+        graph._counts, graph._measured = dict(self._counts), dict(self._measured)
         return graph
 
     def absorb(self, other: AspectTransitionGraph) -> None:
-        """Add the aspects and counts of another graph; a full graph takes no further aspects, nor what leads to them.
+        """Add the aspects, counts and readings of another graph.
+
+        A full graph takes no further aspects, nor what leads to them.
 
         Raises:
             InvalidInputError: It was made under other assumptions.
@@ -184,6 +210,8 @@ class AspectTransitionGraph:
             start, end = aspects[source], aspects[target]
             if start is not None and end is not None:
                 self.add_transition(start, action, end, count)
+        for name, moments in other.measured.items():
+            self.add_moments(name, moments)
 
     def _aspect_for(self, pattern: int | None) -> int | None:
         if pattern is None:
@@ -225,6 +253,7 @@ class AspectTransitionGraph:
         twin = AspectTransitionGraph(self.name, self.assumptions)
         twin._aspect_of = dict(self._aspect_of)
         twin._counts, twin._count_table = dict(self._counts), self._count_table
+        twin._measured = dict(self._measured)
         twin.revision = self.revision
         return twin
 
@@ -235,11 +264,12 @@ class AspectTransitionGraph:
     def __eq__(self, other: object) -> bool:
         if not isinstance(other, AspectTransitionGraph):
             return NotImplemented
-        return (self.name, self.assumptions, self.aspects, self._counts) == (
+        return (self.name, self.assumptions, self.aspects, self._counts, self._measured) == (
             other.name,
             other.assumptions,
             other.aspects,
             other._counts,
+            other._measured,
         )
 
     __hash__ = None  # type: ignore[assignment]  # mypy's usual complaint; graphs grow, so they are no keys
@@ -260,8 +290,18 @@ class AspectTransitionGraph:
         ]
         title = f"{self.name}: {self.n_known} of {assumptions.n_aspects} aspects, {len(self._counts)} observed edges"
         headings = (f"aspect ({', '.join(assumptions.alphabet.slots)})", *assumptions.actions)
-        note = f"· not yet tried; collection node: {self.n_unobserved} unobserved"
+        note = f"· not yet tried; collection node: {self.n_unobserved} unobserved{self._felt()}"
         return Table(title, headings if rows else (), shortened(rows, _ASPECTS, "aspects"), note)
+
+    def _felt(self) -> str:
+        """Return what the object has by its readings, as words; empty without."""
+        words = ""
+        for sense in self.assumptions.object_senses:
+            moments = self._measured.get(sense.name)
+            if moments is not None:
+                value, _ = sense.estimate(moments, sense.variance([moments]))
+                words += f"; {sense.name} {value:.3g} {sense.unit}".rstrip() + f" ({moments.count} readings)"
+        return words
 
     def _repr_html_(self) -> str:
         return self.table()._repr_html_()

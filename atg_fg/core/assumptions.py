@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from atg_fg.core.checks import distinct_names, whole_number
 from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.object_sense import ObjectSense, check_object_senses
 from atg_fg.core.patterns import PatternAlphabet
 
 #: Whole numbers up to here are exact as floating-point numbers.
@@ -21,15 +22,18 @@ class Assumptions:
         n_aspects: |G|, the aspects of each object; at most |𝒵|.
         actions: Names of the actions, all different.
         alphabet: The patterns one aspect can show.
+        object_senses: What the robot can feel of an object as a whole, such as its weight.
 
     Raises:
-        InvalidInputError: A number below one, no or repeated actions, or |G| > |𝒵|.
+        InvalidInputError: A number below one, no or repeated actions, |G| > |𝒵|, or senses of the object that do not
+            fit.
     """
 
     n_objects: int
     n_aspects: int
     actions: tuple[str, ...]
     alphabet: PatternAlphabet
+    object_senses: tuple[ObjectSense, ...] = ()
 
     def __post_init__(self) -> None:
         for field in ("n_objects", "n_aspects"):
@@ -40,6 +44,8 @@ class Assumptions:
                 f"n_aspects: {self.n_aspects}; expected at most the {len(self.alphabet)} patterns there are, "
                 "since the aspects of one object are unique"
             )
+        senses = check_object_senses(self.object_senses, self.actions, self.alphabet.slots)
+        object.__setattr__(self, "object_senses", senses)
 
     def extends(self, other: Assumptions) -> bool:
         """Return whether these are the other ones, perhaps with labels more that its open alphabet did not know."""

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from atg_fg.core.looks import likely_pattern
-from atg_fg.core.patterns import Confidences, Detection, Evidence, PatternAlphabet
+from atg_fg.core.patterns import Confidences, Detection, Evidence, Measured, PatternAlphabet
 
 
 def confidences_in(info: Mapping[str, Any]) -> Confidences:
@@ -20,21 +20,29 @@ def confidences_of(looks: Sequence[Mapping[str, Any]]) -> tuple[Confidences, ...
     return stated if any(stated) else ()
 
 
+def measured_in(info: Mapping[str, Any]) -> Measured:
+    """Return the readings of the object as a whole, as the ``info`` of a look has them by name; empty without."""
+    return tuple((str(name), float(value)) for name, value in (info.get("measured") or {}).items())
+
+
 def truth_of(evidence: Evidence, presented: int | str | None = None) -> dict[str, Any]:
     """Return the ``info`` of a look that came without a world: what was presented, if known, and the evidence kept."""
     return {
         **({} if presented is None else {"object": presented}),
         **({"confidences": evidence.confidences} if evidence.confidences else {}),
         **({"likelihoods": evidence.slots} if evidence.slots else {}),
+        **({"measured": dict(evidence.measured)} if evidence.measured else {}),
     }
 
 
 def evidence_in(alphabet: PatternAlphabet, detection: Detection, info: Mapping[str, Any]) -> Evidence:
     """Return the evidence of a look that was recorded as a detection and the ``info`` beside it."""
-    likelihoods = info.get("likelihoods") or ()
-    if not any(likelihoods):
-        return Evidence.of_detection(alphabet, detection, confidences_in(info))
-    return Evidence.of_slots(alphabet, likelihoods, detection, confidences_in(info))
+    likelihoods, measured = info.get("likelihoods") or (), measured_in(info)
+    if any(likelihoods):
+        evidence = Evidence.of_slots(alphabet, likelihoods, detection, confidences_in(info))
+    else:
+        evidence = Evidence.of_detection(alphabet, detection, confidences_in(info))
+    return evidence.with_readings(measured)
 
 
 def pattern_to_learn(

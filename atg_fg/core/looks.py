@@ -9,14 +9,15 @@ import numpy as np
 
 from atg_fg.core.checks import brief, number
 from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.object_sense import ObjectSense, check_measured
 from atg_fg.core.patterns import Evidence, FloatArray, PatternAlphabet
 
-#: Evidence; the symbol in each slot, by number or name; symbols, or their likelihoods, by slot; ``None`` if nothing
-#: was seen.
+#: Evidence; the symbol in each slot, by number or name; symbols, or their likelihoods, by slot, and readings by the
+#: name of a sense of the object; ``None`` if nothing was seen.
 Look: TypeAlias = Evidence | Sequence[int | str | None] | Mapping[str, Any] | None
 
 
-def evidence_of(alphabet: PatternAlphabet, look: Look) -> Evidence:
+def evidence_of(alphabet: PatternAlphabet, look: Look, object_senses: Sequence[ObjectSense] = ()) -> Evidence:
     """Return a look as evidence.
 
     A mapping has for some of the slots a symbol, or the likelihood of each symbol. Likelihoods that sum to less than
@@ -25,6 +26,7 @@ def evidence_of(alphabet: PatternAlphabet, look: Look) -> Evidence:
     Args:
         alphabet: The patterns.
         look: See ``Look``.
+        object_senses: What may be felt of the object as a whole.
 
     Raises:
         InvalidInputError: It does not fit the alphabet.
@@ -35,16 +37,20 @@ def evidence_of(alphabet: PatternAlphabet, look: Look) -> Evidence:
         return Evidence.of_detection(alphabet, (None,) * len(alphabet.slots))
     if not isinstance(look, Mapping):
         return Evidence.of_detection(alphabet, look)
-    for slot in look:
-        if slot not in alphabet.slots:
-            raise InvalidInputError(f"look: slot {slot!r}; expected one of: {', '.join(alphabet.slots)}")
+    names = [*alphabet.slots, *(sense.name for sense in object_senses)]
+    for name in look:
+        if name not in names:
+            raise InvalidInputError(f"look: slot {name!r}; expected one of: {', '.join(names)}")
+    measured = check_measured(
+        object_senses, {name: value for name, value in look.items() if name not in alphabet.slots}, "look"
+    )
     given = [look.get(slot) for slot in alphabet.slots]
     labels = [None if isinstance(each, Mapping) else each for each in given]
     weights = [
         _weights(alphabet, slot, each) if isinstance(each, Mapping) else None
         for slot, each in zip(alphabet.slots, given, strict=True)
     ]
-    return Evidence.of_slots(alphabet, weights, labels)
+    return Evidence.of_slots(alphabet, weights, labels).with_readings(measured)
 
 
 def _weights(alphabet: PatternAlphabet, slot: str, given: Mapping[Any, Any]) -> FloatArray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Final
 
@@ -11,8 +11,9 @@ from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.checks import plain_text
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.merging import Merge, check_merges
+from atg_fg.core.object_sense import Moments
 from atg_fg.core.open_alphabets import Relabelling
-from atg_fg.core.patterns import Confidences, Detection, Evidence, SlotLikelihoods
+from atg_fg.core.patterns import Confidences, Detection, Evidence, Measured, SlotLikelihoods
 from atg_fg.core.sense import Readings, Sense, SensedTrial
 from atg_fg.core.table import Bar, Cell, Table
 from atg_fg.core.transactions import Persistent, one_transaction
@@ -80,6 +81,7 @@ class RobotMemory(Persistent):
         actions: Sequence[int | None],
         matched: str | None,
         name: str | None = None,
+        measured: Sequence[Measured] = (),
     ) -> str:
         """Learn from a trial and return the name of the ATG it went to.
 
@@ -88,11 +90,12 @@ class RobotMemory(Persistent):
             actions: Index of the action between each two, ``None`` where it is not sure, length t.
             matched: Name of the ATG to extend, or ``None`` if the object was judged novel.
             name: Of the ATG of a novel object; the next number if not given.
+            measured: What was felt of the object as a whole at each look; none if nothing was.
 
         Raises:
             UnknownNameError: There is no such ATG.
-            InvalidInputError: Lengths or indices that do not fit, a novel object of which no pattern was seen whole, or
-                a name that is taken.
+            InvalidInputError: Lengths or indices that do not fit, a novel object of which no pattern was seen whole, a
+                name that is taken, or what is no reading.
         """
         if matched is None and all(pattern is None for pattern in patterns):
             raise InvalidInputError("learn: no pattern was seen whole; expected at least one of a novel object")
@@ -101,6 +104,8 @@ class RobotMemory(Persistent):
         else:
             graph = self[matched].copy()
         graph.learn(patterns, actions)
+        for each in measured:
+            graph.measure(each)
         self._graphs[graph.name] = graph
         return graph.name
 
@@ -111,6 +116,7 @@ class RobotMemory(Persistent):
         actions: Sequence[int],
         confidences: Sequence[Confidences] = (),
         likelihoods: Sequence[SlotLikelihoods] = (),
+        measured: Sequence[Measured] = (),
         *,
         taught: bool = False,
     ) -> str:
@@ -124,6 +130,7 @@ class RobotMemory(Persistent):
             actions: Index of the action between each two, length t.
             confidences: How sure the detector was of each symbol at each look; none if it never says.
             likelihoods: Of the symbols in each slot at each look, where evidence was no symbol; none if it always was.
+            measured: What was felt of the object as a whole at each look; none if nothing was.
             taught: Whether someone said of which object the trial is, so that nothing changes hands because of it.
         """
         return name
@@ -161,24 +168,28 @@ class RobotMemory(Persistent):
         for name in dict.fromkeys(owners):
             own = [number for number, owner in enumerate(owners) if owner == name]
             trials = [(before[number].detections, detections[number], before[number].actions) for number in own]
-            touched = any(old != new for old, new, _ in trials)
-            if (
-                touched
-                and name in self._graphs
-                and self._graphs[name]
-                == self._made_of(name, [(self._patterns(old), actions) for old, _, actions in trials])
-            ):
-                self._graphs[name] = self._made_of(name, [(self._patterns(new), actions) for _, new, actions in trials])
+            if name not in self._graphs or not any(old != new for old, new, _ in trials):
+                continue
+            readings = self._graphs[name].measured
+            made = [(self._patterns(old), actions) for old, _, actions in trials]
+            if self._graphs[name] == self._made_of(name, made, readings):
+                anew = [(self._patterns(new), actions) for _, new, actions in trials]
+                self._graphs[name] = self._made_of(name, anew, readings)
 
     def _owners_of(self, trials: Sequence[SensedTrial]) -> list[str]:
         """Return the name of the ATG that each trial is of."""
         return [trial.owner for trial in trials]
 
     def _made_of(
-        self, name: str, trials: Iterable[tuple[Sequence[int | None], Sequence[int]]]
+        self,
+        name: str,
+        trials: Iterable[tuple[Sequence[int | None], Sequence[int]]],
+        readings: Mapping[str, Moments],
     ) -> AspectTransitionGraph:
-        """Return the ATG that patterns and actions of some trials make."""
+        """Return the ATG that patterns and actions of some trials make, and what is kept of readings."""
         graph = AspectTransitionGraph(name, self.assumptions)
+        for sense, moments in readings.items():
+            graph.add_moments(sense, moments)
         for patterns, actions in trials:
             graph.learn(patterns, actions)
         return graph

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.object_sense import Moments
 from atg_fg.core.open_alphabets import Relabelling
 
 
@@ -47,7 +48,7 @@ class Merge:
 
 
 def learned_since(current: AspectTransitionGraph, before: AspectTransitionGraph) -> AspectTransitionGraph:
-    """Return the aspects and counts that ``current`` has beyond ``before``, and the ends of these transitions."""
+    """Return what ``current`` has learned beyond ``before``: aspects, counts with both their ends, and readings."""
     shown, known = current.pattern_indices, before.pattern_indices
     old = Counter({(known[x], a, known[y]): count for (x, a, y), count in before.counts.items()})
     new = Counter({(shown[x], a, shown[y]): count for (x, a, y), count in current.counts.items()}) - old
@@ -59,6 +60,8 @@ def learned_since(current: AspectTransitionGraph, before: AspectTransitionGraph)
     aspect = {pattern: number for number, pattern in enumerate(since.pattern_indices)}
     for (source, action, target), count in new.items():
         since.add_transition(aspect[source], action, aspect[target], count)
+    for name, moments in current.measured.items():
+        since.add_moments(name, moments.minus(before.measured.get(name, Moments())))
     return since
 
 

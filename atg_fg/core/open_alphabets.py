@@ -21,7 +21,9 @@ def new_labels(alphabet: PatternAlphabet, look: Look) -> list[str]:
     """Return the labels of a look that an open alphabet does not know yet; none of a closed one."""
     if not alphabet.is_open or isinstance(look, str) or not isinstance(look, (Mapping, Sequence)):
         return []
-    entries: list[Any] = list(look.values() if isinstance(look, Mapping) else look)
+    entries: list[Any] = (
+        [label for slot, label in look.items() if slot in alphabet.slots] if isinstance(look, Mapping) else list(look)
+    )
     given = (label for each in entries for label in (each if isinstance(each, Mapping) else [each]))
     return list(dict.fromkeys(each for each in given if isinstance(each, str) and each not in alphabet.names))
 
@@ -69,6 +71,9 @@ class Relabelling:
         A detection agrees with all patterns that have its symbols. Where a likelihood was given, a pattern that it does
         not name is as improbable as the least probable one.
         """
+        return self._evidence(evidence).with_readings(evidence.measured)
+
+    def _evidence(self, evidence: Evidence) -> Evidence:
         if evidence.slots:
             return Evidence.of_slots(
                 self.new, self.slots(evidence.slots), self.detection(evidence.detection or ()), evidence.confidences

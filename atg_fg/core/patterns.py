@@ -36,6 +36,8 @@ Confidences: TypeAlias = tuple[float | None, ...]
 
 #: Likelihood of each symbol in each slot, ``None`` for a slot without one.
 SlotLikelihoods: TypeAlias = tuple[tuple[float, ...] | None, ...]
+#: Readings of the object as a whole, such as its weight, each with the name of its sense.
+Measured: TypeAlias = tuple[tuple[str, float], ...]
 
 
 Array = TypeVar("Array", bound=NDArray[Any])
@@ -245,6 +247,7 @@ class Evidence:
         confidences: Of each of these symbols; empty if the detector says nothing of it.
         slots: Likelihood of each symbol in each slot, ``None`` for a slot without one; empty if not given slot by
             slot.
+        measured: Readings of the object as a whole; they say nothing of the pattern.
     """
 
     likelihood: FloatArray
@@ -252,6 +255,7 @@ class Evidence:
     detection: Detection | None = None
     confidences: Confidences = ()
     slots: SlotLikelihoods = ()
+    measured: Measured = ()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "likelihood", read_only(np.array(self.likelihood, dtype=np.float64)))
@@ -263,6 +267,7 @@ class Evidence:
             self.detection,
             self.confidences,
             self.slots,
+            self.measured,
         )  # so that no copy can be written to, either
 
     @classmethod
@@ -354,6 +359,10 @@ class Evidence:
         if not evidence.likelihood.any():
             raise InvalidInputError("evidence: all zero; expected at least one pattern that it is possible under")
         return evidence
+
+    def with_readings(self, measured: Measured) -> Evidence:
+        """Return this evidence with these readings of the object as a whole; itself if there are none."""
+        return replace(self, measured=measured) if measured or self.measured else self
 
     @cached_property
     def _range(self) -> tuple[float, float, float]:

@@ -140,7 +140,7 @@ def assumptions_for(recording: Recording, assumptions: Assumptions) -> Assumptio
         raise InvalidInputError(f"{recording.place}: {error}") from error
     if extended is alphabet:
         return assumptions
-    return Assumptions(assumptions.n_objects, assumptions.n_aspects, assumptions.actions, extended)
+    return replace(assumptions, alphabet=extended)
 
 
 def used_labels(trials: Sequence[RecordedTrial]) -> list[str]:

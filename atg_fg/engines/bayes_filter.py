@@ -66,6 +66,9 @@ class BayesFilter(FilterInference):
         log_probability = self._compiled.look(evidence.likelihood, seen)
         if not math.isfinite(log_probability):
             raise self.impossible_evidence()
+        if evidence.measured:
+            log_probability += self._compiled.weigh(self.model.objects.likelihood(evidence.measured))
+            self.model.feel(evidence.measured)
         self.scaled_log_evidence += log_probability
         self.model.learn(*seen)
 
@@ -78,7 +81,7 @@ class BayesFilter(FilterInference):
 
     def compute_expected_entropies(self) -> FloatArray:
         """Return E[H(O | z_{t+1}, a, …)] of each action (eq. 3), nats, shape [A]."""
-        if self._compiled is None:
+        if self._compiled is None or self.model.objects.senses:
             return super().compute_expected_entropies()
         return self._compiled.expected_entropies(self.model.n_unseen)
 

@@ -84,7 +84,7 @@ class Enumeration(Inference):
         return weights * likelihood.reshape(len(weights), *past, likelihood.shape[1])
 
     def compute_expected_entropies(self) -> FloatArray:
-        """Add every hypothetical action and then every hypothetical pattern, as eq. 3 is written.
+        """Add every hypothetical action and then every hypothetical pattern and reading, as eq. 3 is written.
 
         What is to come depends on the past through X_t alone, so explanations that end alike are summed first.
         """
@@ -93,11 +93,15 @@ class Enumeration(Inference):
         total = last.sum()
         for action in range(self.model.n_actions):
             predicted = self._extended(last, action)
+            revealed = self.model.objects.revealed_by(self.memory.assumptions.actions[action])
+            readings = self.model.objects.readings(revealed, last.sum(axis=1) / total)
             for pattern in range(self.model.n_patterns):
                 likelihood = np.zeros(self.model.n_patterns)
                 likelihood[pattern] = 1.0
                 observed = self._times_last(predicted, self.model.likelihood(Evidence(likelihood)))
-                probability = observed.sum() / total
-                if probability > 0:
-                    entropies[action] += probability * self._identity_of(observed).entropy
+                for weight, density in zip(readings.weights, readings.densities, strict=True):
+                    felt = self._times_last(observed, density[:, None])
+                    probability = weight * felt.sum() / total
+                    if probability > 0:
+                        entropies[action] += probability * self._identity_of(felt).entropy
         return entropies

@@ -34,6 +34,10 @@ class FollowedPlain:
         twin._log_weights = self._log_weights + log_weight
         return twin
 
+    def weigh(self, log_likelihood: FloatArray) -> None:
+        """Take in what was felt of the object as a whole: ln p(reading | O), shape [H]."""
+        self._log_weights = self.filter.log_weights = self._log_weights + log_likelihood
+
     @property
     def log_joint(self) -> FloatArray:
         """Ln p(O, the object is of this kind, z_0:t | a_1:t), shape [H]."""

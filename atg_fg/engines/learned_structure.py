@@ -98,9 +98,12 @@ class LearnedStructure(BayesFilter):
 
     def update(self, evidence: Evidence) -> None:
         """Condition on a look, the last of ``history``, and learn from it."""
+        felt = log_of(self.model.objects.likelihood(evidence.measured)) if evidence.measured else None
         super().update(evidence)
         for each in self._followed:
             each.observe(evidence)
+            if felt is not None:
+                each.weigh(felt)
         if self._followed:
             least = self.log_evidence - self._log_scale + np.log(RULED_OUT)
             self._followed = [each for each in self._followed if log_sum_exp(each.log_joint) > least]
@@ -295,6 +298,10 @@ class FollowedStructure:
         twin._log_weights = self._log_weights + log_weight
         return twin
 
+    def weigh(self, log_likelihood: FloatArray) -> None:
+        """Take in what was felt of the object as a whole: ln p(reading | O), shape [H]."""
+        self._log_weights = self.filter.log_weights = self._log_weights + log_likelihood
+
     @property
     def log_joint(self) -> FloatArray:
         """Ln p(O, the object follows this structure, z_0:t | a_1:t), shape [H]."""
@@ -374,6 +381,10 @@ class FollowedChain:
         twin = copy.copy(self)
         twin._log_weights = self._log_weights + log_weight
         return twin
+
+    def weigh(self, log_likelihood: FloatArray) -> None:
+        """Take in what was felt of the object as a whole: ln p(reading | O), shape [H]."""
+        self._log_weights = self.filter.log_weights = self._log_weights + log_likelihood
 
     @property
     def log_joint(self) -> FloatArray:

@@ -1,9 +1,10 @@
 """Loopy belief propagation: sum-product messages on the trial's factor graph, with O shared by all factors.
 
-The factors are p(O), ψ_0(O, X_0) = p(X_0 | O) p(z_0 | X_0, O) and ψ_s(O, X_{s-1}, X_s) = p(X_s | X_{s-1}, a_s, O)
-p(z_s | X_s, O). Each observation factor is part of the factor that brings in its aspect, since the scope of the one is
-within that of the other. From the first action on, O, X_{s-1} and the two factors that hold both make a loop; then the
-beliefs are those of a fixed point of the Bethe free energy, if there is one that the messages reach.
+The factors are p(O) with all that is felt of the object as a whole, ψ_0(O, X_0) = p(X_0 | O) p(z_0 | X_0, O) and ψ_s(O,
+X_{s-1}, X_s) = p(X_s | X_{s-1}, a_s, O) p(z_s | X_s, O). Each observation factor is part of the factor that brings in
+its aspect, since the scope of the one is within that of the other. From the first action on, O, X_{s-1} and the two
+factors that hold both make a loop; then the beliefs are those of a fixed point of the Bethe free energy, if there is
+one that the messages reach.
 """
 
 from __future__ import annotations
@@ -115,7 +116,7 @@ class Messages:
 
     def __init__(self, chain: Chain, damping: float) -> None:
         self._damping = damping
-        self._log_prior = log_of(chain.prior)
+        self._log_prior = chain.log_identity
         # ψ_0 as [H, 1, W_0], as if X_0 came from a variable with one state.
         incoming = [chain.initial[:, None, :], *chain.transitions]
         observed = [*chain.likelihoods, np.ones((1, 1))][: len(incoming)]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Iterator
 from typing import NamedTuple
 
@@ -54,14 +55,16 @@ def learn_history(
         memory.extend(alphabet.names)
         rests = list(_rests(trial.history, Relabelling(alphabet, memory.assumptions.alphabet)))
         patterns = [rest.pattern for rest in rests]
-        learned = memory.learn(patterns, [rest.action for rest in rests[:-1]], matched, name)
+        measured = [look.measured for look in trial.history.evidence]
+        learned = memory.learn(patterns, [rest.action for rest in rests[:-1]], matched, name, measured)
         for piece in _pieces(rests):
             looks = [rest.strongest for rest in piece]
             detections = [look.detection or (None,) * len(memory.assumptions.alphabet.slots) for look in looks]
             actions = [rest.action for rest in piece[:-1] if rest.action is not None]
             confidences = [look.confidences for look in looks] if any(look.confidences for look in looks) else []
             likelihoods = [look.slots for look in looks] if any(look.slots for look in looks) else []
-            learned = memory.learn_shared(learned, detections, actions, confidences, likelihoods, taught=taught)
+            felt = [tuple(itertools.chain.from_iterable(look.measured for look in rest.looks)) for rest in piece]
+            learned = memory.learn_shared(learned, detections, actions, confidences, likelihoods, felt, taught=taught)
     return learned
 
 

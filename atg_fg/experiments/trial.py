@@ -9,13 +9,14 @@ import numpy as np
 
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.core.look_info import confidences_in
+from atg_fg.core.look_info import confidences_in, measured_in
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.patterns import Evidence
 from atg_fg.core.records import TrialRecord, TrialStep, TrialSummary
 from atg_fg.core.sense import Sense, SenseTrial, likelihoods_of, readings_of
 from atg_fg.inference.interface import Inference
 from atg_fg.policies import Policy
+from atg_fg.senses.object_readings import look_of, readings_in, without_readings
 from atg_fg.worlds.base import World, detection_of, symbols_of
 from atg_fg.worlds.registry import assumptions_of, sense_of
 
@@ -34,18 +35,23 @@ def check_world_fits(world: World, assumptions: Assumptions, sense: Sense | None
         raise InvalidInputError(f"world: features {of_world.features!r}, memory {have}; expected the same features")
     n_actions, n_slots = len(assumptions.actions), len(assumptions.alphabet.slots)
     n_symbols = assumptions.alphabet.n_symbols
+    space = without_readings(world.observation_space, assumptions.object_senses)
     if sense is not None:
-        sense.check_space(world.observation_space)
+        sense.check_space(space)
     symbols = [n_symbols] * n_slots if sense is None else []
-    if (getattr(world.action_space, "n", 0), symbols_of(world.observation_space)) != (n_actions, symbols):
+    if (getattr(world.action_space, "n", 0), symbols_of(space)) != (n_actions, symbols):
         raise InvalidInputError(
-            f"world: {world.action_space} and {world.observation_space}; expected {n_actions} actions and looks of "
+            f"world: {world.action_space} and {space}; expected {n_actions} actions and looks of "
             f"{n_slots} slots with numbers from -1, missing, to {n_symbols - 1}"
         )
     stated = assumptions_of(world, assumptions.n_objects) if world.has_wrapper_attr("assumptions") else assumptions
     for place, ours, theirs in (
         ("actions", assumptions.actions, stated.actions),
         ("slots", assumptions.alphabet.slots, stated.alphabet.slots),
+        (
+            "senses of the object",
+            *([f"{each.name} {each.unit}".rstrip() for each in of.object_senses] for of in (assumptions, stated)),
+        ),
     ):
         if ours != theirs:
             raise InvalidInputError(f"world: {place} {', '.join(theirs)}; expected those remembered: {', '.join(ours)}")
@@ -62,11 +68,16 @@ def sensed_look(
         observation: Of the world.
         info: That came with it.
     """
+    measured, look = readings_in(assumptions.object_senses, observation), look_of(observation)
     if senses is None:
-        return Evidence.of_detection(assumptions.alphabet, detection_of(observation), confidences_in(info)), info
-    evidence, readings = senses.look(observation)
-    unsure = {"likelihoods": evidence.slots} if evidence.slots else {}
-    return evidence, {**info, "confidences": evidence.confidences, "readings": readings, **unsure}
+        evidence = Evidence.of_detection(assumptions.alphabet, detection_of(look), confidences_in(info))
+    else:
+        evidence, readings = senses.look(look)
+        unsure = {"likelihoods": evidence.slots} if evidence.slots else {}
+        info = {**info, "confidences": evidence.confidences, "readings": readings, **unsure}
+    if not measured:
+        return evidence, info
+    return evidence.with_readings(measured), {**info, "measured": dict(measured)}
 
 
 def run_trial(
@@ -193,9 +204,10 @@ def learn_steps(
     """
     actions = [memory.assumptions.action_index(action) for action in trial.actions[: len(trial.steps) - 1]]
     looks = [step.truth for step in trial.steps]
-    name = memory.learn(list(trial.patterns), actions, matched, name)
+    measured = [measured_in(look) for look in looks]
+    name = memory.learn(list(trial.patterns), actions, matched, name, measured)
     likelihoods = likelihoods_of(looks)
-    name = memory.learn_shared(name, trial.detections, actions, trial.confidences, likelihoods, taught=taught)
+    name = memory.learn_shared(name, trial.detections, actions, trial.confidences, likelihoods, measured, taught=taught)
     readings = readings_of(looks)
     if readings and memory.sense is not None:
         memory.learn_readings(name, readings, trial.detections, actions)

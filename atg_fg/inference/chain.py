@@ -35,12 +35,14 @@ class Chain:
         transitions: p(X_s | X_{s-1}, a_s, O) for s = 1 … t, each of shape [H, W_{s-1}, W_s].
         likelihoods: p(z_s | X_s, O) for each look, each of shape [H, W_s]; one less than there are
             variables X if the trial ended with an action.
+        objects: p(what was felt of the object | O, what was felt before), each with the time of its look, of shape [H].
     """
 
     prior: FloatArray
     initial: FloatArray
     transitions: tuple[FloatArray, ...]
     likelihoods: tuple[FloatArray, ...]
+    objects: tuple[tuple[int, FloatArray], ...] = ()
 
     @property
     def widths(self) -> tuple[int, ...]:
@@ -54,6 +56,7 @@ class Chain:
             self.initial[[hypothesis]],
             tuple(table[[hypothesis]] for table in self.transitions),
             tuple(table[[hypothesis]] for table in self.likelihoods),
+            tuple((time, table[[hypothesis]]) for time, table in self.objects),
         )
 
     def scaled(self) -> tuple[Chain, float]:
@@ -61,9 +64,17 @@ class Chain:
 
         So evidence on any scale stays within the range of floats. A likelihood that is zero throughout is kept.
         """
-        greatest = [float(table.max()) or 1.0 for table in self.likelihoods]
-        likelihoods = tuple(table / scale for table, scale in zip(self.likelihoods, greatest, strict=True))
-        return replace(self, likelihoods=likelihoods), float(np.log(greatest).sum())
+        tables = [*self.likelihoods, *(table for _, table in self.objects)]
+        greatest = [float(table.max()) or 1.0 for table in tables]
+        scaled = [table / scale for table, scale in zip(tables, greatest, strict=True)]
+        n_looks = len(self.likelihoods)
+        objects = tuple((time, table) for (time, _), table in zip(self.objects, scaled[n_looks:], strict=True))
+        return replace(self, likelihoods=tuple(scaled[:n_looks]), objects=objects), float(np.log(greatest).sum())
+
+    @property
+    def log_identity(self) -> FloatArray:
+        """Ln of p(O) and all that was felt of the object, shape [H]: what is known of O but for its aspects."""
+        return log_of(self.prior) + sum((log_of(table) for _, table in self.objects), np.zeros(len(self.prior)))
 
     def balanced(self) -> tuple[Chain, float]:
         """Return the chain of one hypothesis with each likelihood over p(z_s | z_0:s-1), and the sum of their ln.
@@ -100,9 +111,12 @@ def build_chain(
     chosen = list(range(model.n_hypotheses)) if hypotheses is None else list(hypotheses)
     incoming: list[FloatArray] = []
     likelihoods: list[FloatArray] = []
+    objects: list[tuple[int, FloatArray]] = []
     for step, evidence in enumerate(history.evidence):
         table = model.transition(history.actions[step - 1]) if step else model.base_row
-        likelihood = model.likelihood(evidence)
+        likelihood = model.pattern_likelihood(evidence)
+        if evidence.measured:
+            objects.append((step, model.objects.likelihood(evidence.measured)[chosen]))
         revelation = model.learn_from(history, step)
         if revelation is not None:
             padding = [(0, 0)] * (table.ndim - 1) + [(0, model.n_states - table.shape[-1])]
@@ -113,7 +127,7 @@ def build_chain(
         likelihoods.append(likelihood[chosen])
     if history.awaits_evidence:
         incoming.append(model.transition(history.actions[-1])[chosen])
-    return Chain(model.prior[chosen], incoming[0], tuple(incoming[1:]), tuple(likelihoods))
+    return Chain(model.prior[chosen], incoming[0], tuple(incoming[1:]), tuple(likelihoods), tuple(objects))
 
 
 class ForwardPass(NamedTuple):
@@ -145,6 +159,7 @@ def forward_pass(chain: Chain) -> ForwardPass:
         joint = predicted * chain.likelihoods[time] if time < len(chain.likelihoods) else predicted
         total = joint.sum(axis=1)
         log_joint = log_joint + log_of(total)
+        log_joint = log_joint + sum((log_of(table) for at, table in chain.objects if at == time), np.zeros(len(total)))
         log_joints.append(log_joint)
         filtered.append(joint / np.where(total > 0, total, 1.0)[:, None])
     return ForwardPass(tuple(log_joints), tuple(filtered))

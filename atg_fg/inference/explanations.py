@@ -49,7 +49,7 @@ def best_explanations(chain: Chain, k: int = 1) -> list[Explanation]:
     likelihoods = _likelihoods(chain)
     log_evidence = log_sum_exp(_possible(chain).log_joint)
     #: ln p of the r-th best way to each state, shape [H, W, r], and where it came from, flat over (state, rank)
-    scores = (log_of(chain.prior)[:, None] + log_of(chain.initial) + log_of(likelihoods[0]))[:, :, None]
+    scores = (chain.log_identity[:, None] + log_of(chain.initial) + log_of(likelihoods[0]))[:, :, None]
     origins: list[IntArray] = []
     for transition, likelihood in zip(chain.transitions, likelihoods[1:], strict=True):
         ways = scores[:, :, :, None] + log_of(transition)[:, :, None, :]

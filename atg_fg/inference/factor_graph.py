@@ -2,6 +2,7 @@
 
     p(O) · p(X_0 | O) · Π_s p(X_s | X_{s-1}, a_s, O) · Π_s p(z_s | X_s, O)
 
+and, where the robot feels something of the object as a whole, such as its weight, a factor on O alone for each reading.
 What the paper calls the Bayes filter is a marginal of this graph, and its expected entropy (eq. 3) is that of the graph
 with one more action and one more observation added as factors.
 """
@@ -51,6 +52,8 @@ class RecognitionGraph:
             self._add([self.object_key, self.aspect_key(time - 1), self.aspect_key(time)], transition)
         for time, likelihood in enumerate(chain.likelihoods):
             self._add([self.object_key, self.aspect_key(time)], likelihood)
+        for _, table in chain.objects:
+            self._add([self.object_key], table)
 
     def _add(self, keys: list[int], table: FloatArray) -> None:
         self.graph.push_back(factors.factor(keys, table))
@@ -74,8 +77,12 @@ class RecognitionGraph:
         self._add([self.object_key, self.aspect_key(self.last), self.aspect_key(self.last + 1)], transition)
         self.chain = replace(self.chain, transitions=(*self.chain.transitions, transition))
 
-    def observe(self, likelihood: FloatArray) -> None:
+    def observe(self, likelihood: FloatArray, felt: FloatArray | None = None) -> None:
         """Add the factor p(z_t | X_t, O), shape [H, W_t], of evidence about the last aspect.
+
+        Args:
+            likelihood: The factor.
+            felt: p(what was felt of the object | O, what was felt before), shape [H]: a factor on O alone.
 
         Raises:
             InvalidInputError: There is evidence about it already.
@@ -84,6 +91,9 @@ class RecognitionGraph:
             raise InvalidInputError(f"factor graph: X{self.last} is observed already; expected an action first")
         self._add([self.object_key, self.aspect_key(self.last)], likelihood)
         self.chain = replace(self.chain, likelihoods=(*self.chain.likelihoods, likelihood))
+        if felt is not None:
+            self._add([self.object_key], felt)
+            self.chain = replace(self.chain, objects=(*self.chain.objects, (self.last, felt)))
 
     def copy(self) -> RecognitionGraph:
         """Return a graph that shares these factors and can be added to alone."""

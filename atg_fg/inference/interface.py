@@ -15,6 +15,7 @@ from atg_fg.core.belief import SHOWN, BeliefTable, IdentityBelief
 from atg_fg.core.errors import ImpossibleEvidenceError, InvalidInputError
 from atg_fg.core.looks import Look, evidence_of, strength
 from atg_fg.core.memory import RobotMemory
+from atg_fg.core.object_sense import check_measured
 from atg_fg.core.open_alphabets import Relabelling, new_labels
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, FloatArray, protect
@@ -106,8 +107,8 @@ class Inference(ABC):
         label had been known when the trial began.
 
         Args:
-            look: Evidence; the symbol in each slot, by number or name; symbols or their likelihoods by slot; or
-                ``None`` if nothing was seen.
+            look: Evidence; the symbol in each slot, by number or name; symbols or their likelihoods by slot, and
+                readings of the object as a whole by the name of their sense; or ``None`` if nothing was seen.
             independent: Whether a look without an action before it errs by itself. If not, as of frames that show the
                 same shadow, the one that says most counts alone.
 
@@ -120,8 +121,10 @@ class Inference(ABC):
         if labels:
             self._meet(labels, look, independent=independent)
             return
-        evidence = evidence_of(alphabet, look)
+        senses = self.memory.assumptions.object_senses
+        evidence = evidence_of(alphabet, look, senses)
         evidence.check(self.model.n_patterns)
+        check_measured(senses, dict(evidence.measured), "look")
         if self.history.awaits_evidence:
             self._take_in(evidence)
         elif independent:

@@ -35,9 +35,10 @@ from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.compact.columns import positions
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
-from atg_fg.core.patterns import Evidence, FloatArray, IntArray, protect
+from atg_fg.core.patterns import Evidence, FloatArray, IntArray, Measured, protect
 from atg_fg.inference.counted_edges import Edges, Targets, distinct
 from atg_fg.inference.history import History
+from atg_fg.inference.object_tables import ObjectTables
 
 #: State index of the collection node.
 COLLECTION = 0
@@ -87,6 +88,7 @@ class RecognitionModel:
         aspect_of: State of each hypothesis that shows a pattern, shape [H, |𝒵|]; ``COLLECTION`` if it knows none.
         pattern_of: Pattern that each state shows, shape [H, W]; -1 for collection nodes and padding.
         edges: The counted transitions.
+        objects: What is felt of the object as a whole.
     """
 
     def __init__(self, memory: RobotMemory, parameters: ModelParameters, prior: IdentityBelief | None = None) -> None:
@@ -118,6 +120,7 @@ class RecognitionModel:
         self.n_patterns = len(memory.assumptions.alphabet)
         self.n_unseen = memory.n_unseen
         self.n_hypotheses = len(memory) + 1
+        self.objects = ObjectTables.of(memory)
         if prior is None:
             self.prior = IdentityBelief.uniform(len(memory), self.n_unseen).probabilities
         else:
@@ -190,6 +193,11 @@ class RecognitionModel:
         return predicted
 
     def likelihood(self, evidence: Evidence) -> FloatArray:
+        """Return p(evidence | x, i), shape [H, W]: of the pattern, and of what was felt of the object."""
+        table = self.pattern_likelihood(evidence)
+        return table * self.objects.likelihood(evidence.measured)[:, None] if evidence.measured else table
+
+    def pattern_likelihood(self, evidence: Evidence) -> FloatArray:
         """Return p(evidence | x, i) = Σ_z evidence(z) p(z | x, i), shape [H, W]."""
         noise = self.parameters.observation_noise / self.n_patterns * evidence.likelihood.sum()
         shown = (1.0 - self.parameters.observation_noise) * evidence.likelihood + noise
@@ -207,6 +215,7 @@ class RecognitionModel:
         part = copy(self)
         part.n_hypotheses = len(hypotheses)
         part.prior, part.n_known = self.prior[hypotheses], self.n_known[hypotheses]
+        part.objects = self.objects.restricted(hypotheses)
         part.aspect_of, part.pattern_of = self.aspect_of[hypotheses], self.pattern_of[hypotheses]
         number = np.full(self.n_hypotheses, -1)
         number[hypotheses] = np.arange(len(hypotheses))
@@ -220,8 +229,17 @@ class RecognitionModel:
         vars(self).update(state)
         protect(state.values())
 
+    def feel(self, measured: Measured) -> None:
+        """Take in readings of the object as a whole, for those to come."""
+        self.objects = self.objects.after(measured)
+
     def learn_from(self, history: History, time: int) -> Revelation | None:
-        """Extend every hypothesis by the look at a time of a trial, as ``learn`` does; ``None`` if no aspect is new."""
+        """Extend every hypothesis by the look at a time of a trial, as ``learn`` does; ``None`` if no aspect is new.
+
+        What was felt of the object counts for the looks to come, whether or not aspects are learned.
+        """
+        if history.evidence[time].measured:
+            self.feel(history.evidence[time].measured)
         return self.learn(*history.step(time))
 
     def learn(self, previous: int | None, action: int | None, pattern: int | None) -> Revelation | None:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from atg_fg.core.log_math import log_sum_exp
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.learning import gibbs_kernels, kernels, look_kernels, slip_kernels
+from atg_fg.learning import gibbs_kernels, kernels, look_kernels, object_kernels, slip_kernels
 from atg_fg.learning.kernels import Clusters, TrialArrays
 from atg_fg.learning.raw_trials import Recording
 from atg_fg.learning.sampling_task import Structure, Task, Votes
@@ -160,10 +160,10 @@ class Chain:
     def trials(self, task: Task) -> TrialArrays:
         """Return the trials as this chain takes them to have gone."""
         looks = np.where(self.wrong[..., None, None], 1.0, task.right_looks) if self.judges else task.looks
-        return TrialArrays(looks, self.actions, task.recording.lengths)
+        return TrialArrays(looks, self.actions, task.recording.lengths, task.recording.felt)
 
     def _each_slot(self, task: Task) -> TrialArrays:
-        return TrialArrays(task.looks, self.actions, task.recording.lengths)
+        return TrialArrays(task.looks, self.actions, task.recording.lengths, task.recording.felt)
 
     def scatter(self, rng: np.random.Generator) -> None:
         """Take each trial for one of an object of its own, with a start drawn at random."""
@@ -258,6 +258,7 @@ class Chain:
         """Return ln p(partition, starts, slips, all looks | structure) + ln p(structure), up to a constant."""
         n_trials, n_objects = len(self.clusters.owner), int(np.count_nonzero(self.clusters.n_trials))
         total = self.log_prior + self._learn_again(task) + float(task.log_partition[n_objects])
+        total += object_kernels.log_felt(self.trials(task), self.clusters)
         # The first trial of an object may begin anywhere: it only gives its states their names.
         total -= (n_trials - n_objects) * float(np.log(self.n_states))
         for automaton in self.own_automata:

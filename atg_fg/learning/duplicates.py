@@ -11,7 +11,8 @@ model that learns as it goes. With one, an object follows structure S with proba
     Σ_S w_S (ρ_i ρ_j / π · B_S + (1 − ρ_i) (1 − ρ_j) / (1 − π) · B_0) + w_none B_0
 
 where B_S is the factor of the raw trials of j given the contents of i, B_0 that of the plain model, w the weight of
-each structure and of none, and π the share of objects that follow a structure.
+each structure and of none, and π the share of objects that follow a structure. What was felt of the objects as a whole,
+such as their weight, is a factor of its own.
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.log_math import log_of
 from atg_fg.core.memory import RobotMemory
+from atg_fg.core.object_sense import Moments
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import FloatArray
 from atg_fg.learning.believed_structure import BelievedStructure, UncertainObjects
@@ -135,9 +137,10 @@ class _Odds:
         """Return the log odds that an ATG is of the same object as each of the others, shape [len(others)]."""
         if not others:
             return np.zeros(0)
-        plain = np.array([self._plain_factor(index, other, self._parameters) for other in others])
+        plain: FloatArray = np.array([self._plain_factor(index, other, self._parameters) for other in others])
+        felt: FloatArray = self._log_prior + np.array([self._felt_factor(index, other) for other in others])
         if not self._believed and self._uncertain is None:
-            return self._log_prior + plain
+            return felt + plain
         terms = []
         mine_plain, theirs_plain, plain_share = 1.0, np.ones(len(others)), 1.0
         for each in self._believed:
@@ -158,8 +161,18 @@ class _Odds:
             mine_plain, theirs_plain, plain_share = mine_plain - mine, theirs_plain - theirs, plain_share - share
         both_plain = np.maximum(mine_plain, 0.0) * np.maximum(theirs_plain, 0.0) / plain_share
         terms.append(log_of(both_plain) + plain)
-        total: FloatArray = np.logaddexp.reduce(np.array(terms))
-        return self._log_prior + total
+        total: FloatArray = felt + np.logaddexp.reduce(np.array(terms))
+        return total
+
+    def _felt_factor(self, index: int, other: int) -> float:
+        """Return the log Bayes factor of what was felt of the objects as a whole."""
+        factor = 0.0
+        for sense in self._memory.assumptions.object_senses:
+            one, two = (self._graphs[each].measured.get(sense.name, Moments()) for each in (index, other))
+            variance = sense.variance(graph.measured.get(sense.name, Moments()) for graph in self._graphs)
+            factor += sense.log_evidence(one.plus(two), variance)
+            factor -= sense.log_evidence(one, variance) + sense.log_evidence(two, variance)
+        return factor
 
     def _plain_factor(self, index: int, other: int, parameters: ModelParameters) -> float:
         """Return the log Bayes factor of the plain model with this α and δ."""

@@ -269,7 +269,7 @@ class EvidenceLearner:
     def _task(self, trials: Sequence[RawTrial], noise: DetectorNoise) -> Task:
         from atg_fg.learning.sampling_task import Task
 
-        recording = Recording.of(trials, self.assumptions.alphabet.n_symbols)
+        recording = Recording.of(trials, self.assumptions.alphabet.n_symbols, self.assumptions.object_senses)
         return Task.of(recording, noise, self.assumptions.n_objects)
 
     def _log_scale(self, task: Task) -> float:

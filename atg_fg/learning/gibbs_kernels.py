@@ -18,6 +18,7 @@ from atg_fg.learning.kernels import (
     take_in,
     walk,
 )
+from atg_fg.learning.object_kernels import cluster_weights
 
 #: Draws of an automaton for the evidence of a fresh object that has its own, and how one is annealed on a first trial.
 OWN_DRAWS = 2000
@@ -77,7 +78,9 @@ def trial_weights(
                 walk(successors, trials.actions[trial], length, start, path)
                 n_visited, scale = look_up(trials.looks[trial], length, path, clusters.registers, local, visited)
                 weights[cluster, start] = scale + log_product(clusters.tables[cluster], local, visited, n_visited)
-    weights[free] += log_new
+    prior = cluster_weights(trials, trial, clusters, free, log_new)
+    for cluster in range(len(prior)):
+        weights[cluster] += prior[cluster]
 
 
 @compiled
@@ -136,7 +139,8 @@ def trial_move(
     if len(log_own) > 0:
         share = sharing(clusters)
         weights[free] += np.log(share)
-        weights[-1, 0] = log_new[n_clusters] + np.log(1.0 - share) + log_own[trial] + np.log(n_states)
+        prior = cluster_weights(trials, trial, clusters, free, log_new[n_clusters])[free]
+        weights[-1, 0] = prior + np.log(1.0 - share) + log_own[trial] + np.log(n_states)
     if len(votes) > 0:
         count_votes(weights, free, votes)
     drawn = draw_by_logarithm(weights.ravel(), beta, rng)

@@ -15,6 +15,7 @@ import numpy as np
 
 from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.inference.kernels.compilation import compiled
+from atg_fg.learning.raw_trials import NOTHING_FELT
 
 #: Products are put aside as a logarithm before they leave the range of floating-point numbers.
 _SMALL = 1e-120
@@ -27,11 +28,14 @@ class TrialArrays(NamedTuple):
         looks: Likelihood of each symbol in each slot at each look, shape [N, T, J, V].
         actions: Index of the action after each look, shape [N, T]; that of *stay* is the last row of successors.
         lengths: Number of looks, shape [N].
+        felt: Of each sense of the object how many readings there are, their sum in units of their error from what is
+            typical, and the variance between objects in these units, shape [N, S, 3].
     """
 
     looks: FloatArray
     actions: IntArray
     lengths: IntArray
+    felt: FloatArray = NOTHING_FELT
 
 
 class Clusters(NamedTuple):

@@ -16,6 +16,7 @@ from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.inference.kernels.compilation import compiled
 from atg_fg.learning.gibbs_kernels import count_votes, put_in, take_out, trial_weights
 from atg_fg.learning.kernels import Clusters, TrialArrays, draw_by_logarithm, walk
+from atg_fg.learning.object_kernels import cluster_weights
 from atg_fg.learning.slip_kernels import slip_paths
 
 #: Objects and starts whose looks are judged: so many nats behind the best, where slots err each for itself.
@@ -119,6 +120,7 @@ def judged_move(
         owner = free  # the first of an object is that of a new one
     weights = np.empty((len(clusters.n_trials), n_states))
     trial_weights(each_slot, trial, clusters, free, log_new[n_clusters], weights)
+    prior = cluster_weights(each_slot, trial, clusters, free, log_new[n_clusters])
     least = weights.max() - _MARGIN
     if owner >= 0:
         least = min(least, weights[owner, start])
@@ -137,8 +139,7 @@ def judged_move(
             weights[cluster, first] = judge_looks(
                 looks[trial], length, path, clusters.registers, table, rate, forced, judged[number], rng
             )
-            if cluster == free:
-                weights[cluster, first] += log_new[n_clusters]
+            weights[cluster, first] += prior[cluster]
     count_votes(weights, free, votes)
     drawn = draw_by_logarithm(weights.ravel(), 1.0, rng)
     settle(trials, looks, trial, wrong, judged[drawn])
@@ -186,6 +187,7 @@ def judged_path_move(
     if owner >= 0 and clusters.n_trials[owner] == 0:
         owner = free
     paths, scores = slip_paths(each_slot, trial, done, clusters, free, log_new[n_clusters], log_odds)
+    prior = cluster_weights(each_slot, trial, clusters, free, log_new[n_clusters])
     least = scores.max() - _MARGIN
     judged = np.empty((scores.size, looks.shape[1]), np.bool_)
     table = np.empty(clusters.tables.shape[1:])
@@ -205,7 +207,7 @@ def judged_path_move(
             if forced:
                 judged[number] = wrong[trial]
             said = judge_looks(looks[trial], length, path, clusters.registers, table, rate, forced, judged[number], rng)
-            scores[which, cluster] = paths.log_prior[which] + said + (log_new[n_clusters] if cluster == free else 0.0)
+            scores[which, cluster] = paths.log_prior[which] + said + prior[cluster]
     count_votes(np.ascontiguousarray(scores.T), free, votes)
     drawn = draw_by_logarithm(scores.ravel(), 1.0, rng)
     which, cluster = drawn // scores.shape[1], drawn % scores.shape[1]

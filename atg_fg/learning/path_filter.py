@@ -38,7 +38,7 @@ class PathFilter:
     def __init__(
         self, chain: BelievedChain, noise: DetectorNoise, alphabet: PatternAlphabet, log_weights: FloatArray
     ) -> None:
-        self._chain, self._noise, self._alphabet, self._log_weights = chain, noise, alphabet, log_weights
+        self._chain, self._noise, self._alphabet, self.log_weights = chain, noise, alphabet, log_weights
         n_states, n_registers = len(chain.registers), chain.tables.shape[1]
         self._states = np.arange(n_states)[:, None]
         self._local = np.ones((n_states, n_registers, alphabet.n_symbols))
@@ -121,7 +121,7 @@ class PathFilter:
         self.observe(Evidence(np.zeros(0), None, tuple(symbols.tolist())))
 
     def _drop(self) -> None:
-        joint = self._log_prior[:, None] + self._factors.sum(axis=1) + self._log_weights
+        joint = self._log_prior[:, None] + self._factors.sum(axis=1) + self.log_weights
         best = joint.max(axis=1)
         order = np.argsort(-best, kind="stable")[:MAX_PATHS]
         kept = np.sort(order[best[order] > best.max() + np.log(NEGLIGIBLE)])
@@ -193,7 +193,7 @@ class PathFilter:
 
     def _pairs(self) -> tuple[IntArray, IntArray, FloatArray]:
         """Return the paths and owners that matter, ordered by owner, and p(path | owner, what was seen) of each."""
-        joint = self._log_prior[:, None] + self._factors.sum(axis=1) + self._log_weights
+        joint = self._log_prior[:, None] + self._factors.sum(axis=1) + self.log_weights
         probability = np.exp(joint - log_sum_exp(joint.ravel()))
         owners, paths = np.nonzero(probability.T > UNIMPORTANT)
         weights = probability[paths, owners]

@@ -30,7 +30,7 @@ class PlainFilter:
     """
 
     def __init__(self, model: RecognitionModel, log_weights: FloatArray) -> None:
-        self.model, self._log_weights = model, log_weights
+        self.model, self.log_weights = model, log_weights
         self.aspects = model.base_row
         self.log_evidence = np.zeros(model.n_hypotheses)
         self._last: Evidence | None = None
@@ -46,7 +46,7 @@ class PlainFilter:
 
     def observe(self, evidence: Evidence) -> None:
         """Take in a look."""
-        joint = self.aspects * self.model.likelihood(evidence)
+        joint = self.aspects * self.model.pattern_likelihood(evidence)
         given = joint.sum(axis=1)
         self.log_evidence = self.log_evidence + log_of(given)
         self.aspects = np.where(given[:, None] > 0, joint / np.where(given > 0, given, 1.0)[:, None], self.aspects)
@@ -88,5 +88,5 @@ class PlainFilter:
 
     def _important(self) -> IntArray:
         """Return the hypotheses that are not negligible beside the others."""
-        logarithms = self._log_weights + self.log_evidence
+        logarithms = self.log_weights + self.log_evidence
         return np.flatnonzero(logarithms > logarithms.max() + np.log(UNIMPORTANT))

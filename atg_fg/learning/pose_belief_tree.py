@@ -14,7 +14,12 @@ import numpy as np
 
 from atg_fg.core.log_math import x_log_x
 from atg_fg.core.patterns import Evidence, FloatArray, IntArray
-from atg_fg.inference.expected_entropy import expected_entropies_of_table, next_pattern_joint, pattern_table
+from atg_fg.inference.expected_entropy import (
+    counting_readings,
+    expected_entropies_of_table,
+    next_pattern_joint,
+    pattern_table,
+)
 from atg_fg.inference.recognition_model import RecognitionModel
 from atg_fg.learning.path_filter import PathFilter
 from atg_fg.learning.plain_filter import PlainFilter
@@ -55,10 +60,14 @@ class StructureBelief:
         return total + sum((each.belief for each in self.following), np.zeros(len(total)))
 
     @cached_property
+    def _matters(self) -> IntArray:
+        """Objects that are not too improbable, and last *unseen*, shape [I]."""
+        return np.union1d(np.flatnonzero(self.identity > UNIMPORTANT), self.model.n_hypotheses - 1)
+
+    @cached_property
     def joint(self) -> FloatArray:
         """J = p(O = i, z | a) for the next look, shape [A, I, |𝒵|], of objects that matter and last of *unseen*."""
-        model = self.model
-        matters = np.union1d(np.flatnonzero(self.identity > UNIMPORTANT), model.n_hypotheses - 1)
+        model, matters = self.model, self._matters
         table = np.zeros((model.n_actions, len(matters), model.n_patterns))
         if self.plain.sum() > UNIMPORTANT:
             table += pattern_table(model, next_pattern_joint(model, self.plain), matters)
@@ -70,7 +79,10 @@ class StructureBelief:
 
     def expected_entropies(self) -> FloatArray:
         """Return the expected entropy of identity after one more action (eq. 3) in nats, shape [A]."""
-        return expected_entropies_of_table(self.joint, float(self.identity[-1]), self.model.n_unseen)
+        entropies = expected_entropies_of_table(self.joint, float(self.identity[-1]), self.model.n_unseen)
+        if not self.model.objects.senses:
+            return entropies
+        return counting_readings(self.model, entropies, self.joint, np.ones(self.joint.shape[2]), self._matters)
 
     def after(self, action: int) -> StructureLooks:
         """Return what may be seen after an action."""

@@ -108,7 +108,7 @@ class PoseFilter:
         log_weights: FloatArray | None = None,
     ) -> None:
         self._poses, self._rates, self._alphabet = poses, rates, alphabet
-        self._log_weights = log_weights
+        self.log_weights = log_weights
         n_owners, n_poses = len(contents), len(poses.registers)
         # A new object's registers have no names yet, so any pose of a class is as good as another.
         is_known: NDArray[np.bool_] = np.any(contents, axis=(1, 2))
@@ -281,9 +281,9 @@ class PoseFilter:
 
     def _importance(self) -> FloatArray:
         """Return the weight of each owner relative to the greatest, shape [H]; one for each that has no rivals."""
-        if self._log_weights is None:
+        if self.log_weights is None:
             return np.ones(len(self.log_evidence))
-        logarithms = self._log_weights + self.log_evidence
+        logarithms = self.log_weights + self.log_evidence
         total = log_sum_exp(logarithms)
         return np.exp(logarithms - total) if np.isfinite(total) else np.zeros_like(logarithms)
 
@@ -298,7 +298,7 @@ class PoseFilter:
             shown: The probability of each of its symbols, shape [I, S].
             revealed: The probability that it was revealed and has a symbol, shape [I, S].
         """
-        if self._log_weights is not None:
+        if self.log_weights is not None:
             return
         from_all = self._rates.repeat / self._alphabet.n_symbols * unrevealed(before[:, None, :])
         share = np.minimum(from_all / np.maximum(shown - before, TINY), 1.0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Final, NamedTuple
@@ -10,6 +11,7 @@ import numpy as np
 
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.object_sense import ObjectSense, check_measured
 from atg_fg.core.open_alphabets import Relabelling
 from atg_fg.core.patterns import (
     MISSING,
@@ -18,6 +20,7 @@ from atg_fg.core.patterns import (
     Evidence,
     FloatArray,
     IntArray,
+    Measured,
     PatternAlphabet,
     SlotLikelihoods,
     read_only,
@@ -34,12 +37,14 @@ class RawTrial:
         actions: Index of the action between each two looks; t of them.
         confidences: How sure the detector was of each symbol at each look, as it was given; empty if it never says.
         likelihoods: Of the symbols of each slot at each look, as they were given; empty if there are none.
+        measured: What was felt of the object as a whole at each look; empty if nothing was.
     """
 
     detections: tuple[Detection, ...]
     actions: tuple[int, ...]
     confidences: tuple[Confidences, ...] = ()
     likelihoods: tuple[SlotLikelihoods, ...] = ()
+    measured: tuple[Measured, ...] = ()
 
     @classmethod
     def of(cls, looks: Sequence[Evidence], actions: Sequence[int], alphabet: PatternAlphabet) -> RawTrial:
@@ -55,11 +60,13 @@ class RawTrial:
             else:
                 likelihoods.append(look.slots)
         confidences = tuple(look.confidences for look in looks)
+        measured = tuple(look.measured for look in looks)
         return cls(
             tuple(look.detection or nothing for look in looks),
             tuple(actions),
             confidences if any(confidences) else (),
             tuple(likelihoods) if any(likelihoods) else (),
+            measured if any(measured) else (),
         )
 
     def relabelled(self, labels: Relabelling) -> RawTrial:
@@ -92,6 +99,12 @@ class RawTrial:
                 assumptions.alphabet.n_symbols,
                 f"{place}: look {look}: likelihoods",
             )
+        if len(self.measured) not in (0, len(self.detections)):
+            raise InvalidInputError(
+                f"{place}: {len(self.measured)} readings; expected one entry for each of {len(self.detections)} looks"
+            )
+        for look, measured in enumerate(self.measured):
+            check_measured(assumptions.object_senses, dict(measured), f"{place}: look {look}")
         for action in self.actions:
             if not 0 <= action < len(assumptions.actions):
                 raise InvalidInputError(f"{place}: action {action}; expected 0 to {len(assumptions.actions) - 1}")
@@ -129,6 +142,8 @@ def side_by_side(trials: Sequence[RawTrial]) -> TrialArrays:
     return TrialArrays(symbols, actions)
 
 
+#: What was felt where there is no sense of the object.
+NOTHING_FELT: Final = np.zeros((1, 0, 3))
 #: Likelihoods where all looks are labels.
 NOTHING_SOFT: Final = read_only(np.ones((1, 1, 1, 1)))
 
@@ -144,6 +159,7 @@ class Recording(NamedTuple):
         n_symbols: V.
         likelihoods: Of each symbol in each slot at each look, with the mean 1, shape [N, T, J, V]; all 1 where none was
             given. Of shape [1, 1, 1, 1] if none ever was.
+        felt: Of each sense of the object, as ``atg_fg.learning.kernels.TrialArrays`` has it, shape [N, S, 3].
     """
 
     labels: IntArray
@@ -152,10 +168,11 @@ class Recording(NamedTuple):
     lengths: IntArray
     n_symbols: int
     likelihoods: FloatArray = NOTHING_SOFT
+    felt: FloatArray = NOTHING_FELT
 
     @classmethod
-    def of(cls, trials: Sequence[RawTrial], n_symbols: int) -> Recording:
-        """Return trials, at least one, as arrays."""
+    def of(cls, trials: Sequence[RawTrial], n_symbols: int, senses: Sequence[ObjectSense] = ()) -> Recording:
+        """Return trials, at least one, as arrays, with the readings of senses of the object."""
         arrays = side_by_side(trials)
         confidences = np.full(arrays.symbols.shape, np.nan)
         for number, trial in enumerate(trials):
@@ -164,7 +181,25 @@ class Recording(NamedTuple):
                     confidences[number, look] = [np.nan if value is None else value for value in stated]
         actions = np.concatenate((np.maximum(arrays.actions, 0), np.zeros((len(trials), 1), dtype=np.int64)), axis=1)
         lengths = np.array([len(trial.detections) for trial in trials])
-        return cls(arrays.symbols, confidences, actions, lengths, n_symbols, _likelihoods(trials, arrays, n_symbols))
+        soft = _likelihoods(trials, arrays, n_symbols)
+        return cls(arrays.symbols, confidences, actions, lengths, n_symbols, soft, _felt(trials, senses))
+
+
+def _felt(trials: Sequence[RawTrial], senses: Sequence[ObjectSense]) -> FloatArray:
+    if not senses:
+        return NOTHING_FELT
+    result = np.zeros((len(trials), len(senses), 3))
+    for number, sense in enumerate(senses):
+        moments = [
+            sense.moments_of(value for look in trial.measured for name, value in look if name == sense.name)
+            for trial in trials
+        ]
+        variance = sense.variance(moments)
+        middle = sense.on_scale(sense.typical)
+        result[:, number, 0] = [each.count for each in moments]
+        result[:, number, 1] = [(each.total - each.count * middle) / math.sqrt(variance) for each in moments]
+        result[:, number, 2] = sense.spread**2 / variance
+    return result
 
 
 def _likelihoods(trials: Sequence[RawTrial], arrays: TrialArrays, n_symbols: int) -> FloatArray:

@@ -15,6 +15,7 @@ from atg_fg.learning.kernels import (
     TrialArrays,
     draw_by_logarithm,
 )
+from atg_fg.learning.object_kernels import cluster_weights
 
 #: Paths with slips that are followed at once, and how improbable one may be beside the best.
 _MAX_PATHS = 256
@@ -106,6 +107,7 @@ def slip_paths(
     # ln Σ_c table(r, c) local(r, c) of each path, register and cluster; 0 where nothing was seen yet
     factors = np.zeros((capacity, n_registers, n_clusters))
     scores = np.full((capacity, n_clusters), -np.inf)
+    prior = cluster_weights(trials, trial, clusters, free, log_new)
     for time in range(length):
         if time > 0:
             n_old = n_paths
@@ -135,7 +137,7 @@ def slip_paths(
                         factors[path, register, cluster] = np.log(max(total, 1e-300))
             for cluster in range(n_clusters):
                 if clusters.automaton[cluster] == 0 and (clusters.n_trials[cluster] > 0 or cluster == free):
-                    score = log_prior[path] + (log_new if cluster == free else 0.0)
+                    score = log_prior[path] + prior[cluster]
                     for register in range(n_registers):
                         score += factors[path, register, cluster]
                     scores[path, cluster] = score

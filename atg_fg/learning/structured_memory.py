@@ -6,6 +6,7 @@ import copy
 import itertools
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -19,7 +20,7 @@ from atg_fg.core.memory import RobotMemory
 from atg_fg.core.merging import Merge
 from atg_fg.core.open_alphabets import Relabelling
 from atg_fg.core.parameters import ModelParameters
-from atg_fg.core.patterns import Confidences, Detection, SlotLikelihoods
+from atg_fg.core.patterns import Confidences, Detection, Measured, SlotLikelihoods
 from atg_fg.core.sense import Sense, SensedTrial
 from atg_fg.core.transactions import one_transaction
 from atg_fg.learning.evidence_learner import EvidenceLearner, SavedEvidence
@@ -105,6 +106,7 @@ class StructuredMemory(RobotMemory):
         actions: Sequence[int],
         confidences: Sequence[Confidences] = (),
         likelihoods: Sequence[SlotLikelihoods] = (),
+        measured: Sequence[Measured] = (),
         *,
         taught: bool = False,
     ) -> str:
@@ -120,13 +122,15 @@ class StructuredMemory(RobotMemory):
             confidences: How sure the detector was of each symbol at each look; none if it never says.
             likelihoods: Of the symbols in each slot at each look, where evidence was no symbol; none if it always was.
                 The model in which looks err learns from the whole of them.
+            measured: What was felt of the object as a whole at each look; none if nothing was.
             taught: Whether someone said of which object the trial is, so that nothing changes hands because of it.
 
         Raises:
             UnknownNameError: There is no such ATG.
             InvalidInputError: It is no trial under these assumptions.
         """
-        trial = RawTrial(tuple(detections), tuple(actions), tuple(confidences), tuple(likelihoods))
+        felt = tuple(measured) if any(measured) else ()
+        trial = RawTrial(tuple(detections), tuple(actions), tuple(confidences), tuple(likelihoods), felt)
         trial.check(self.assumptions)
         before = self.gain if len(self.learner.trials) >= FIRST_TRIALS else 0.0
         self.learner.learn(self[name].name, trial, search=before < OUTDONE)
@@ -193,9 +197,11 @@ class StructuredMemory(RobotMemory):
 
     def _estimated(self, name: str) -> AspectTransitionGraph:
         """Return the ATG that the raw trials of a name make."""
-        trials = zip(self.learner.trials, self.learner.owners, strict=True)
-        own = (trial for trial, owner in trials if owner == name)
-        return self._made_of(name, ((self._patterns_of(trial), trial.actions) for trial in own))
+        trials = [trial for trial, owner in zip(self.learner.trials, self.learner.owners, strict=True) if owner == name]
+        felt = AspectTransitionGraph(name, self.assumptions)
+        for measured in itertools.chain.from_iterable(trial.measured for trial in trials):
+            felt.measure(measured)
+        return self._made_of(name, ((self._patterns_of(trial), trial.actions) for trial in trials), felt.measured)
 
     def _patterns_of(self, trial: RawTrial) -> list[int | None]:
         """Return the patterns of a trial to learn from."""
@@ -213,7 +219,7 @@ class StructuredMemory(RobotMemory):
         super()._take_for(before, detections)
         # Raw trials are the last ones: those of before the memory had a structure to learn are the sense's alone.
         raw = [
-            RawTrial(taken, trial.actions, trial.confidences)
+            replace(trial, detections=taken, likelihoods=())
             for taken, trial in zip(detections[-len(self.learner.trials) :], self.learner.trials, strict=True)
         ]
         self.learner.take_for(raw)

@@ -14,6 +14,7 @@ from atg_fg.core.patterns import PatternAlphabet
 from atg_fg.learning.structured_memory import StructuredMemory
 from atg_fg.storage.checked_json import check_format, parse_json, placed, read_list, read_object
 from atg_fg.storage.evidence_json import read_evidence, write_evidence
+from atg_fg.storage.object_sense_json import read_moments, read_object_senses, write_moments, write_object_sense
 from atg_fg.storage.sense_json import read_sense, write_sense
 from atg_fg.storage.structure_json import read_learner, write_learner
 
@@ -101,8 +102,12 @@ def _read_merge(value: Any, assumptions: Assumptions, place: str) -> Merge:
 def read_assumptions(value: Any, place: str) -> Assumptions:
     """Return the assumptions at ``place``."""
     fields = read_object(
-        value, place, ("n_objects", "n_aspects", "actions", "slots", "n_symbols"), ("exclusive", "symbols", "open")
+        value,
+        place,
+        ("n_objects", "n_aspects", "actions", "slots", "n_symbols"),
+        ("exclusive", "symbols", "open", "object_senses"),
     )
+    senses = read_object_senses(fields.get("object_senses", []), f"{place}.object_senses")
     texts = {
         key: tuple(
             plain_text(name, f"{place}.{key}[{index}]")
@@ -121,7 +126,7 @@ def read_assumptions(value: Any, place: str) -> Assumptions:
             texts["symbols"],
             fields.get("open", False),
         )
-        return Assumptions(numbers["n_objects"], numbers["n_aspects"], texts["actions"], alphabet)
+        return Assumptions(numbers["n_objects"], numbers["n_aspects"], texts["actions"], alphabet, senses)
 
 
 def write_assumptions(assumptions: Assumptions) -> dict[str, Any]:
@@ -136,6 +141,11 @@ def write_assumptions(assumptions: Assumptions) -> dict[str, Any]:
         **({} if assumptions.alphabet.exclusive else {"exclusive": False}),
         **({"symbols": list(assumptions.alphabet.names)} if assumptions.alphabet.names else {}),
         **({"open": True} if assumptions.alphabet.is_open else {}),
+        **(
+            {"object_senses": [write_object_sense(each) for each in senses]}
+            if (senses := assumptions.object_senses)
+            else {}
+        ),
     }
 
 
@@ -151,7 +161,7 @@ def read_memory(value: Any, assumptions: Assumptions, place: str) -> RobotMemory
 
 def read_graph(value: Any, assumptions: Assumptions, place: str) -> AspectTransitionGraph:
     """Return the ATG at ``place``."""
-    fields = read_object(value, place, ("name", "aspects", "transitions"))
+    fields = read_object(value, place, ("name", "aspects", "transitions"), ("measured",))
     graph = AspectTransitionGraph(plain_text(fields["name"], f"{place}.name"), assumptions)
     for index, pattern in enumerate(read_list(fields["aspects"], f"{place}.aspects")):
         where = f"{place}.aspects[{index}]"
@@ -165,6 +175,10 @@ def read_graph(value: Any, assumptions: Assumptions, place: str) -> AspectTransi
         count = whole_number(edge["count"], f"{where}.count", least=1)
         with placed(where):
             graph.add_transition(ends[0], action, ends[1], count)
+    for name, moments in read_moments(
+        fields.get("measured", {}), assumptions.object_senses, f"{place}.measured"
+    ).items():
+        graph.add_moments(name, moments)
     return graph
 
 
@@ -177,4 +191,5 @@ def write_graph(graph: AspectTransitionGraph) -> dict[str, Any]:
             {"from": source, "action": graph.assumptions.actions[action], "to": target, "count": count}
             for (source, action, target), count in sorted(graph.counts.items())
         ],
+        **({"measured": write_moments(graph.measured)} if graph.measured else {}),
     }

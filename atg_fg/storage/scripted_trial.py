@@ -12,6 +12,7 @@ from typing import Any, Final
 from atg_fg.core.checks import brief, number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
+from atg_fg.core.object_sense import check_measured
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Confidences, Evidence, PatternAlphabet
 from atg_fg.core.slot_checks import check_confidences
@@ -52,8 +53,9 @@ def read_script(text: str, place: str = "script") -> ScriptedTrial:
     """
     document = read_object(parse_json(text, place), place, _KEYS)
     version = check_format(document, SCRIPT_FORMAT, place, newest=2)
-    if version == 1 and isinstance(document["assumptions"], dict) and "exclusive" in document["assumptions"]:
-        raise InvalidInputError(f"{place}: assumptions: 'exclusive' in version 1; expected it in version 2 alone")
+    for key in ("exclusive", "object_senses"):
+        if version == 1 and isinstance(document["assumptions"], dict) and key in document["assumptions"]:
+            raise InvalidInputError(f"{place}: assumptions: {key!r} in version 1; expected it in version 2 alone")
     assumptions = read_assumptions(document["assumptions"], f"{place}: assumptions")
     fields = read_object(document["parameters"], f"{place}: parameters", _PARAMETERS)
     try:
@@ -73,17 +75,18 @@ def _read_step(value: Any, index: int, memory: RobotMemory, version: int, place:
     if isinstance(value, dict) and list(value) == ["observe" if kind == "act" else "act"]:
         order = "an observation is first" if index == 0 else "observations and actions alternate"
         raise InvalidInputError(f"{place}: {next(iter(value))!r}; expected {kind!r}, since {order}")
-    step = read_object(value, place, (kind,), ("confidences",) if version > 1 and kind == "observe" else ())
+    step = read_object(value, place, (kind,), ("confidences", "measured") if version > 1 and kind == "observe" else ())
     if kind == "act":
         return memory.assumptions.action_index(step["act"], f"{place}.act")
     alphabet = memory.assumptions.alphabet
     seen, where = step["observe"], f"{place}.observe"
     stated = read_list(step.get("confidences", []), f"{place}.confidences")
     confidences = check_confidences(stated, len(alphabet.slots), f"{place}.confidences")
+    measured = check_measured(memory.assumptions.object_senses, step.get("measured", {}), f"{place}.measured")
     if version > 1 and isinstance(seen, dict):
-        return _read_slots(seen, confidences, alphabet, where)
+        return _read_slots(seen, confidences, alphabet, where).with_readings(measured)
     detection = alphabet.check_detection(read_list(seen, where), where)
-    return Evidence.of_detection(alphabet, detection, confidences)
+    return Evidence.of_detection(alphabet, detection, confidences).with_readings(measured)
 
 
 def _read_slots(seen: dict[str, Any], confidences: Confidences, alphabet: PatternAlphabet, place: str) -> Evidence:

@@ -20,6 +20,7 @@ from atg_fg.learning.rates import PRIORS, Rates
 from atg_fg.learning.raw_trials import RawTrial
 from atg_fg.learning.shared_structure import SharedStructure
 from atg_fg.storage.checked_json import read_list, read_object
+from atg_fg.storage.object_sense_json import read_readings, write_readings
 
 
 def write_learner(learner: StructureLearner, first: int = 0) -> dict[str, Any]:
@@ -37,6 +38,7 @@ def write_learner(learner: StructureLearner, first: int = 0) -> dict[str, Any]:
                 "observed": _write_looks(trial),
                 "actions": [names[action] for action in trial.actions],
                 **({"confidences": [list(each) for each in trial.confidences]} if trial.confidences else {}),
+                **({"measured": write_readings(trial.measured)} if trial.measured else {}),
             }
             for owner, trial in zip(learner.owners[first:], learner.trials[first:], strict=True)
         ],
@@ -92,7 +94,7 @@ def _read_noise(value: Any, place: str) -> PlainNoise:
 
 def _read_trial(value: Any, assumptions: Assumptions, names: Sequence[str], place: str) -> tuple[str, RawTrial]:
     """Return the name of a trial's object, and the trial."""
-    fields = read_object(value, place, ("object", "observed", "actions"), ("confidences",))
+    fields = read_object(value, place, ("object", "observed", "actions"), ("confidences", "measured"))
     owner = fields["object"]
     if not isinstance(owner, str) or owner not in names:
         raise InvalidInputError(f"{place}.object: {owner!r}; expected the name of an ATG in this memory")
@@ -111,7 +113,8 @@ def _read_trial(value: Any, assumptions: Assumptions, names: Sequence[str], plac
     )
     likelihoods = tuple(slots for _, slots in looks)
     detections = tuple(detection for detection, _ in looks)
-    trial = RawTrial(detections, actions, confidences, likelihoods if any(likelihoods) else ())
+    measured = read_readings(fields.get("measured", []), assumptions.object_senses, f"{place}.measured")
+    trial = RawTrial(detections, actions, confidences, likelihoods if any(likelihoods) else (), measured)
     trial.check(assumptions, place)
     return owner, trial
 

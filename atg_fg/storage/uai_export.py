@@ -56,6 +56,7 @@ def export_trial(script: ScriptedTrial) -> ExportedTrial:
     _check_size(chain, n_patterns)
     first_pattern = 1 + len(chain.widths)
     factors = [ModelFactor((0,), chain.prior), ModelFactor((0, 1), chain.initial)]
+    factors += [ModelFactor((0,), table) for _, table in chain.objects]
     factors += [
         ModelFactor((0, time, time + 1), transition) for time, transition in enumerate(chain.transitions, start=1)
     ]

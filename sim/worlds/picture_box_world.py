@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from functools import cached_property, lru_cache
 from typing import Any, Final
 
@@ -10,11 +11,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atg_fg.core.assumptions import Assumptions
-from atg_fg.core.errors import unknown_name
+from atg_fg.core.errors import InvalidInputError, unknown_name
+from atg_fg.core.object_sense import ObjectSense
 from atg_fg.core.patterns import FloatArray, PatternAlphabet
 from atg_fg.senses.appearance import APPEARANCE, SEEN, AppearanceSense, appearance_space
 from atg_fg.senses.face_features import CROP, DEFAULT_FEATURES, face_features
 from atg_fg.senses.feature_space import FeatureSpace
+from atg_fg.senses.object_readings import observed_readings, with_readings
 from atg_fg.worlds.arcube import (
     ACTION_SOURCES,
     FACES,
@@ -26,7 +29,7 @@ from atg_fg.worlds.arcube import (
     shown_pattern,
 )
 from atg_fg.worlds.base import FiniteStateWorld
-from sim.bodies.pictures import draw_picture, make_picture_boxes
+from sim.bodies.pictures import TYPICAL_WEIGHT, WEIGHT_SPREAD, Difference, draw_picture, make_picture_boxes
 from sim.vision.camera import Camera
 from sim.vision.picture_box_camera import PictureBoxCamera
 from sim.worlds.rendered_world import checked_size
@@ -52,14 +55,17 @@ _WITHIN: Final = 3.0
 class BoxesWithPictures(FiniteStateWorld):
     """Boxes that three actions turn: flip, left, right; of what is in front and on top the features are told.
 
-    An observation has the features of both faces (``appearance``), and which of them were ``seen``. A subclass turns
-    boxes and has a camera: what is told is of ``crops`` and ``seen`` as it left them.
+    An observation has the features of both faces (``appearance``), and which of them were ``seen``. Where the robot
+    feels something of a box as a whole, such as its weight, it also has that, and which of it was ``measured``. A
+    subclass turns boxes and has a camera: what is told is of ``crops``, ``seen`` and ``felt`` as it left them.
 
     Args:
         n_objects: How many boxes there are.
         objects_seed: Seed that they and their pictures are drawn by.
-        look_alikes: Share of the boxes that differ from another one in a single face.
+        look_alikes: Share of the boxes that look like another one.
+        differ_in: What tells these from it: a single ``"face"``, or their ``"weight"`` alone.
         features: ``"colours-and-gradients"``, or ``module:function`` of a user's own.
+        object_senses: What is felt of a box as a whole.
         noise: ``slip`` and ``missing`` of ``FiniteStateWorld``.
 
     Attributes:
@@ -67,6 +73,7 @@ class BoxesWithPictures(FiniteStateWorld):
         features: Makes features of a crop.
         crops: The faces in front and on top that were cut out of the last frame, RGB, shape [2, side, side, 3].
         seen: Which of them were found, shape [2].
+        felt: What was measured by ``object_senses`` in the last action, by their names.
     """
 
     state_name = "orientation"
@@ -77,20 +84,25 @@ class BoxesWithPictures(FiniteStateWorld):
         objects_seed: int = 0,
         *,
         look_alikes: float = 0.1,
+        differ_in: Difference = "face",
         features: str = DEFAULT_FEATURES,
+        object_senses: tuple[ObjectSense, ...] = (),
         render_mode: str | None = None,
         **noise: float,
     ) -> None:
-        self.boxes = make_picture_boxes(n_objects, objects_seed, look_alikes=look_alikes)
+        self.boxes = make_picture_boxes(n_objects, objects_seed, look_alikes=look_alikes, differ_in=differ_in)
         n_actions, n_slots = len(ACTION_SOURCES), len(_SLOTS)
         super().__init__(n_objects, n_actions, n_slots, MOST_CLASSES, render_mode=render_mode, **noise)
         self.features = face_features(features)
         self.alphabet = PatternAlphabet(_SLOTS, MOST_CLASSES, exclusive=False)
         self._features_name = features
         blank = np.zeros((CROP, CROP, 3), dtype=np.uint8)
-        self.observation_space: Any = appearance_space(n_slots, len(self.features(blank)))
+        self.object_senses = object_senses
+        looks = appearance_space(n_slots, len(self.features(blank)))
+        self.observation_space: Any = with_readings(looks, object_senses)
         self.crops: NDArray[np.uint8] = np.zeros((n_slots, CROP, CROP, 3), dtype=np.uint8)
         self.seen: NDArray[np.int8] = np.ones(n_slots, dtype=np.int8)
+        self.felt: dict[str, float] = {}
 
     @cached_property
     def sense(self) -> AppearanceSense:
@@ -100,7 +112,8 @@ class BoxesWithPictures(FiniteStateWorld):
     @property
     def assumptions(self) -> Assumptions:
         """What a robot in this world takes for granted."""
-        return Assumptions(len(self.boxes.faces), len(ORIENTATIONS), tuple(ACTION_SOURCES), self.alphabet)
+        actions = tuple(ACTION_SOURCES)
+        return Assumptions(len(self.boxes.faces), len(ORIENTATIONS), actions, self.alphabet, self.object_senses)
 
     def _n_states(self) -> int:
         return len(ORIENTATIONS)
@@ -116,16 +129,22 @@ class BoxesWithPictures(FiniteStateWorld):
         seen = self.seen.copy()
         if self.missing:
             seen[self.np_random.random(len(_SLOTS)) < self.missing] = 0
-        return {APPEARANCE: appearance * seen[:, None], SEEN: seen}
+        felt = observed_readings(self.object_senses, self.felt)
+        return {APPEARANCE: appearance * seen[:, None], SEEN: seen, **felt}
 
 
 class PictureBoxWorld(BoxesWithPictures):
     """One box before a camera that each look finds a little off its place, in another light.
 
+    To turn the box it is lifted, and its weight may be felt then.
+
     Args:
         n_objects: How many boxes there are.
         objects_seed: Seed that they and their pictures are drawn by.
-        look_alikes: Share of the boxes that differ from another one in a single face.
+        look_alikes: Share of the boxes that look like another one.
+        differ_in: What tells these from it: a single ``"face"``, or their ``"weight"`` alone.
+        weight: Whether the weight is felt.
+        weight_error: Standard deviation of readings of a weight, as a share of it.
         features: ``"colours-and-gradients"``, or ``module:function`` of a user's own.
         slip: Probability that an action fails and the box stays as it is.
         missing: Probability, for each slot alone, that it is not seen.
@@ -154,6 +173,9 @@ class PictureBoxWorld(BoxesWithPictures):
         objects_seed: int = 0,
         *,
         look_alikes: float = 0.1,
+        differ_in: Difference = "face",
+        weight: bool = False,
+        weight_error: float = 0.08,
         features: str = DEFAULT_FEATURES,
         slip: float = 0.0,
         missing: float = 0.0,
@@ -165,8 +187,11 @@ class PictureBoxWorld(BoxesWithPictures):
         blur: float = 0.6,
         render_mode: str | None = None,
     ) -> None:
-        boxes: dict[str, Any] = {"look_alikes": look_alikes, "features": features, "slip": slip, "missing": missing}
-        super().__init__(n_objects, objects_seed, render_mode=render_mode, **boxes)
+        if not isinstance(weight, bool):
+            raise InvalidInputError(f"weight: {weight!r}; expected true or false")
+        boxes: dict[str, Any] = {"look_alikes": look_alikes, "differ_in": differ_in, "features": features}
+        boxes["object_senses"] = (weight_sense(weight_error, ACTION_SOURCES),) if weight else ()
+        super().__init__(n_objects, objects_seed, render_mode=render_mode, slip=slip, missing=missing, **boxes)
         if render_mode not in (None, *self.metadata["render_modes"]):
             raise unknown_name("render mode", render_mode, self.metadata["render_modes"])
         self.camera = PictureBoxCamera(
@@ -190,6 +215,18 @@ class PictureBoxWorld(BoxesWithPictures):
         """Return the last camera frame with what was cut out of it beside it, front below top, whatever the mode."""
         return beside(self.camera.outlined(self.frame), self.crops)
 
+    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
+        """Present a box in an orientation, both drawn at random unless ``options`` sets them."""
+        self.felt = {}
+        return super().reset(seed=seed, options=options)
+
+    def step(self, action: np.int64) -> tuple[Any, float, bool, bool, dict[str, Any]]:
+        """Turn the box, which is lifted for it, and look."""
+        for sense in self.object_senses:
+            error = float(np.exp(sense.error * self.np_random.standard_normal()))
+            self.felt[sense.name] = float(self.boxes.weights[self.object]) * error
+        return super().step(action)
+
     def _look(self) -> dict[str, NDArray[Any]]:
         """Take a frame, and return the features of what is in front and on top of it."""
         pictures = [self.boxes.pictures[picture] for picture in self.boxes.faces[self.object]]
@@ -206,6 +243,16 @@ def beside(picture: NDArray[np.uint8], crops: NDArray[np.uint8]) -> NDArray[np.u
     column = np.vstack(large)
     column = np.pad(column, ((0, height - len(column)), (0, 0), (0, 0)), constant_values=255)
     return np.hstack([picture, np.asarray(column, dtype=np.uint8)])
+
+
+def weight_sense(error: float, actions: Iterable[str]) -> ObjectSense:
+    """Return the sense of a robot that feels the weight of these boxes.
+
+    Args:
+        error: Standard deviation of readings of a weight, as a share of it.
+        actions: Names of those in which it holds the box in the air.
+    """
+    return ObjectSense("weight", TYPICAL_WEIGHT, WEIGHT_SPREAD, error, unit="kg", revealed_by=tuple(actions))
 
 
 @lru_cache(maxsize=4)

@@ -94,3 +94,27 @@ def test_slots_that_exclude_each_other_leave_no_pattern_to_what_repeats():
 
     with pytest.raises(InvalidInputError, match=r"steps\[0\].observe: evidence: all zero"):
         script(exclusive)
+
+
+def test_what_is_felt_stands_beside_a_look():
+    def felt(document):
+        document["assumptions"]["object_senses"] = [WEIGHT]
+        document["steps"][0]["measured"] = {"weight": 0.3}
+
+    plain, weighed = script(), script(felt)
+    assert weighed.steps[0].measured == (("weight", 0.3),)
+    np.testing.assert_array_equal(weighed.steps[0].likelihood, plain.steps[0].likelihood)
+
+    def wrong(document):
+        felt(document)
+        document["steps"][0]["measured"] = {"weight": "light"}
+
+    with pytest.raises(
+        InvalidInputError, match=r"steps\[0\].measured: weight: 'light'; expected a number above 0, in kg"
+    ):
+        script(wrong)
+
+
+WEIGHT = {
+    "name": "weight", "unit": "kg", "typical": 0.3, "spread": 0.5, "error": 0.08, "relative": True, "revealed_by": [],
+}  # fmt: skip

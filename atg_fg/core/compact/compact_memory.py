@@ -16,7 +16,7 @@ from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.merging import Merge
 from atg_fg.core.open_alphabets import Relabelling
-from atg_fg.core.patterns import IntArray
+from atg_fg.core.patterns import IntArray, Measured
 
 
 class GraphArrays(NamedTuple):
@@ -58,6 +58,8 @@ class CompactMemory(RobotMemory):
     def __init__(self, assumptions: Assumptions, graphs: Iterable[AspectTransitionGraph] = ()) -> None:
         super().__init__(assumptions)
         self._fill((), _no_graphs(assumptions))
+        for sense in assumptions.object_senses:
+            raise InvalidInputError(f"compact memory: senses of the object, {sense.name!r}; expected none")
         graphs = list(graphs)
         for graph in graphs:
             if graph.assumptions != assumptions:
@@ -159,6 +161,7 @@ class CompactMemory(RobotMemory):
         actions: Sequence[int | None],
         matched: str | None,
         name: str | None = None,
+        measured: Sequence[Measured] = (),
     ) -> str:
         """Learn from a trial and return the name of the ATG it went to.
 
@@ -167,6 +170,7 @@ class CompactMemory(RobotMemory):
             actions: Index of the action between each two, ``None`` where it is not sure, length t.
             matched: Name of the ATG to extend, or ``None`` if the object was judged novel.
             name: Of the ATG of a novel object; the next number if not given.
+            measured: Nothing: objects have no readings here.
         """
         graph = AspectTransitionGraph(name or self._new_name(), self.assumptions) if matched is None else self[matched]
         known = graph.pattern_indices

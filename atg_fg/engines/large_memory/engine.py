@@ -54,7 +54,8 @@ class LargeMemory(Inference):
         n_exact: Up to so many objects are all filtered one by one, which is exact.
 
     Raises:
-        InvalidInputError: An option has a value that it cannot take, or the prior is no distribution over the objects.
+        InvalidInputError: An option has a value that it cannot take, the prior is no distribution over the objects, or
+            there are senses of the object: what is felt would tell those of a class apart.
     """
 
     name: ClassVar[str] = "large-memory"
@@ -68,6 +69,8 @@ class LargeMemory(Inference):
         n_exact: int = 100,
     ) -> None:
         super().__init__(setup)
+        for sense in self.memory.assumptions.object_senses:
+            raise InvalidInputError(f"engine 'large-memory': senses of the object, {sense.name!r}; expected none")
         few = len(self.memory) <= whole_number(n_exact, "n_exact", 0)
         of_objects = self.model.prior[:-1]
         self._compact = CompactMemory.of(self.memory)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 
 from atg_fg.core.actions import AnyAction, UncertainAction, mixed
+from atg_fg.core.log_math import log_sum_exp
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import FloatArray
@@ -58,6 +59,14 @@ class CompiledFilter:
         n_known = self._tables.n_known.astype(np.int64)
         is_there = np.arange(1 + n_known.max()) <= n_known[:, None]
         return self._log_identity.copy(), np.where(is_there, self._aspects[:, : is_there.shape[1]], 0.0)
+
+    def weigh(self, likelihood: FloatArray) -> float:
+        """Condition on what was felt of the object, p(reading | O) above 0, shape [H]; return ln p(reading | z_0:t)."""
+        log_joint = self._log_identity + np.log(likelihood)
+        log_probability = log_sum_exp(log_joint)
+        self._log_identity = log_joint - log_probability
+        self.identity = np.exp(self._log_identity)
+        return log_probability
 
     def look(self, likelihood: FloatArray, seen: LookedAt) -> float:
         """Condition on a look, and extend every hypothesis by it for the steps to come, if it is to be learned from.

@@ -57,7 +57,9 @@ def holds_memory(connection: sqlite3.Connection) -> bool:
 
 
 def _document(connection: sqlite3.Connection, place: str) -> dict[str, Any]:
-    numbers = connection.execute("SELECT n_objects, n_aspects, n_symbols, exclusive, open FROM assumptions").fetchone()
+    numbers = connection.execute(
+        "SELECT n_objects, n_aspects, n_symbols, exclusive, open, object_senses FROM assumptions"
+    ).fetchone()
     if numbers is None:
         raise InvalidInputError(f"{place}: holds no memory, only records; expected a database with a memory")
     actions, slots, symbols = (
@@ -65,9 +67,13 @@ def _document(connection: sqlite3.Connection, place: str) -> dict[str, Any]:
         for table in ("actions", "slots", "symbols")
     )
     graphs: dict[Any, dict[str, Any]] = {}
-    for number, position, name in connection.execute("SELECT id, position, name FROM graphs ORDER BY position"):
-        whole_number(position, f"{place}: graphs[{len(graphs)}].position", least=0)
+    rows = connection.execute("SELECT id, position, name, measured FROM graphs ORDER BY position")
+    for number, position, name, measured in rows:
+        where = f"{place}: graphs[{len(graphs)}]"
+        whole_number(position, f"{where}.position", least=0)
         graphs[number] = {"name": name, "aspects": [], "transitions": []}
+        if measured is not None:
+            graphs[number]["measured"] = _json(measured, f"{where}.measured")
     _add_aspects(connection, graphs, place)
     _add_transitions(connection, graphs, actions, place)
     document: dict[str, Any] = {
@@ -80,6 +86,7 @@ def _document(connection: sqlite3.Connection, place: str) -> dict[str, Any]:
             "slots": slots,
             **({"symbols": symbols} if symbols else {}),
             **({"open": {1: True}.get(numbers[4], numbers[4])} if numbers[4] != 0 else {}),
+            **({} if numbers[5] is None else {"object_senses": _json(numbers[5], f"{place}: object_senses")}),
         },
         "memory": list(graphs.values()),
     }
@@ -129,8 +136,8 @@ def _structure(
     needed, optional = ("seed", "evaluations", "rates", "candidates"), ("evidence", "uncertain")
     section = read_object(_json(text, place), place, needed, optional)
     trials: list[dict[str, Any]] = []
-    for number, graph, observed, actions, confidences in connection.execute(
-        "SELECT number, graph, observed, actions, confidences FROM raw_trials ORDER BY number"
+    for number, graph, observed, actions, confidences, measured in connection.execute(
+        "SELECT number, graph, observed, actions, confidences, measured FROM raw_trials ORDER BY number"
     ):
         where = f"{place}.trials[{len(trials)}]"
         if whole_number(number, where, least=0) != len(trials):
@@ -139,6 +146,8 @@ def _structure(
         trials.append({"object": owner, "observed": _json(observed, where), "actions": _json(actions, where)})
         if confidences is not None:
             trials[-1]["confidences"] = _json(confidences, where)
+        if measured is not None:
+            trials[-1]["measured"] = _json(measured, where)
     return {**section, "trials": trials}
 
 

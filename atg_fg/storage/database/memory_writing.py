@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from atg_fg.core.aspect_graph import AspectTransitionGraph
+from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.merging import Merge
 from atg_fg.core.patterns import PatternAlphabet
@@ -17,6 +18,7 @@ from atg_fg.learning.raw_trials import RawTrial
 from atg_fg.learning.structured_memory import StructuredMemory
 from atg_fg.storage.evidence_json import write_evidence
 from atg_fg.storage.memory_json import write_merge
+from atg_fg.storage.object_sense_json import write_moments, write_object_sense
 from atg_fg.storage.sense_json import write_sense
 from atg_fg.storage.structure_json import write_learner
 
@@ -72,8 +74,8 @@ def replace_memory(connection: sqlite3.Connection, memory: RobotMemory) -> Held:
         connection.execute("UPDATE trials SET learned = NULL")
     alphabet = assumptions.alphabet
     connection.execute(
-        "INSERT INTO assumptions VALUES (1, ?, ?, ?, ?, ?)",
-        (assumptions.n_objects, assumptions.n_aspects, alphabet.n_symbols, *_flags(alphabet)),
+        "INSERT INTO assumptions VALUES (1, ?, ?, ?, ?, ?, ?)",
+        (assumptions.n_objects, assumptions.n_aspects, alphabet.n_symbols, *_flags(alphabet), _senses(assumptions)),
     )
     connection.executemany("INSERT INTO actions VALUES (?, ?)", enumerate(assumptions.actions))
     connection.executemany("INSERT INTO slots VALUES (?, ?)", enumerate(alphabet.slots))
@@ -90,7 +92,7 @@ def replace_memory(connection: sqlite3.Connection, memory: RobotMemory) -> Held:
 def _assumptions_differ(connection: sqlite3.Connection, memory: RobotMemory) -> bool:
     """Return whether the database holds a memory under other assumptions; labels more at the end are none."""
     alphabet = memory.assumptions.alphabet
-    row = connection.execute("SELECT n_aspects, n_symbols, exclusive, open FROM assumptions").fetchone()
+    row = connection.execute("SELECT n_aspects, n_symbols, exclusive, open, object_senses FROM assumptions").fetchone()
     names = [
         tuple(name for (name,) in connection.execute(f"SELECT name FROM {table} ORDER BY number"))
         for table in ("actions", "slots", "symbols")
@@ -98,12 +100,19 @@ def _assumptions_differ(connection: sqlite3.Connection, memory: RobotMemory) -> 
     if row is None:
         return False
     known = alphabet.names[: row[1]] if alphabet.is_open else alphabet.names
-    sizes = (memory.assumptions.n_aspects, row[1] if alphabet.is_open else alphabet.n_symbols, *_flags(alphabet))
+    n_symbols = row[1] if alphabet.is_open else alphabet.n_symbols
+    sizes = (memory.assumptions.n_aspects, n_symbols, *_flags(alphabet), _senses(memory.assumptions))
     return [row, *names] != [sizes, memory.assumptions.actions, alphabet.slots, known]
 
 
 def _flags(alphabet: PatternAlphabet) -> tuple[int, int]:
     return int(alphabet.exclusive), int(alphabet.is_open)
+
+
+def _senses(assumptions: Assumptions) -> str | None:
+    """Return the senses of the object as text, ``None`` if there are none."""
+    senses = [write_object_sense(each) for each in assumptions.object_senses]
+    return _compact(senses) if senses else None
 
 
 def write_changes(connection: sqlite3.Connection, memory: RobotMemory, held: Held) -> Held:
@@ -158,6 +167,8 @@ def _insert_graph(connection: sqlite3.Connection, number: int, graph: AspectTran
     connection.executemany("INSERT INTO aspects VALUES (?, ?, ?)", aspects)
     transitions = ((number, *edge, count) for edge, count in graph.counts.items())
     connection.executemany("INSERT INTO transitions VALUES (?, ?, ?, ?, ?)", transitions)
+    measured = _compact(write_moments(graph.measured)) if graph.measured else None
+    connection.execute("UPDATE graphs SET measured = ? WHERE id = ?", (measured, number))
 
 
 def _write_merges(
@@ -202,10 +213,11 @@ def _write_structure(
             _compact(trial["observed"]),
             _compact(trial["actions"]),
             _compact(trial["confidences"]) if "confidences" in trial else None,
+            _compact(trial["measured"]) if "measured" in trial else None,
         )
         for index, trial in enumerate(new)
     )
-    connection.executemany("INSERT INTO raw_trials VALUES (?, ?, ?, ?, ?)", rows)
+    connection.executemany("INSERT INTO raw_trials VALUES (?, ?, ?, ?, ?, ?)", rows)
 
 
 def _write_sense(connection: sqlite3.Connection, memory: RobotMemory, held: tuple[SensedTrial, ...]) -> None:

@@ -79,8 +79,15 @@ _VERSION_5: Final = (
 )
 
 
+_VERSION_6: Final = (
+    "ALTER TABLE assumptions ADD COLUMN object_senses TEXT",
+    "ALTER TABLE graphs ADD COLUMN measured TEXT",
+    "ALTER TABLE raw_trials ADD COLUMN measured TEXT",
+)
+
+
 #: The statements of each step: the first makes the tables of version 1, the n-th leads from version n − 1 to n.
-MIGRATIONS: tuple[tuple[str, ...], ...] = (_VERSION_1, _VERSION_2, _VERSION_3, _VERSION_4, _VERSION_5)
+MIGRATIONS: tuple[tuple[str, ...], ...] = (_VERSION_1, _VERSION_2, _VERSION_3, _VERSION_4, _VERSION_5, _VERSION_6)
 
 
 def version_of(connection: sqlite3.Connection, place: str) -> int:

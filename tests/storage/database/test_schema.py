@@ -33,7 +33,7 @@ def pragma(path, name):
 
 def test_a_new_file_has_the_version_of_all_steps(tmp_path):
     open_memory(tmp_path / "robot.db", ARCUBES).close()
-    assert pragma(tmp_path / "robot.db", "user_version") == len(schema.MIGRATIONS) == 5
+    assert pragma(tmp_path / "robot.db", "user_version") == len(schema.MIGRATIONS) == 6
     assert pragma(tmp_path / "robot.db", "application_id") == schema.APPLICATION_ID
     assert pragma(tmp_path / "robot.db", "journal_mode") == "wal"
 
@@ -69,6 +69,6 @@ def test_a_file_of_a_later_version_is_refused_and_left_alone(old):
         connection.execute("PRAGMA user_version = 9")
     before = old.read_bytes()
     for use in (memory_files.load_memory, open_memory):
-        with pytest.raises(InvalidInputError, match="schema version 9, of a later atg-fg; expected at most 5"):
+        with pytest.raises(InvalidInputError, match="schema version 9, of a later atg-fg; expected at most 6"):
             use(old)
     assert old.read_bytes() == before
