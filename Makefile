@@ -52,7 +52,7 @@ $(PEERS_READY): pyproject.toml
 	$(PYTHON) -m venv $(PEERS)
 	$(PEERS)/bin/python -m pip install --quiet --upgrade 'pip>=25.1'
 	$(PEERS)/bin/python -m pip install --quiet '$(TORCH)'
-	$(PEERS)/bin/python -m pip install --quiet --editable '.[bench,agents,viz,notebooks]' --group test
+	$(PEERS)/bin/python -m pip install --quiet --editable '.[bench,agents,ap-gym,viz,notebooks]' --group test
 	touch $@
 
 peers: $(PEERS_READY)  ## Install into .venv-peers the libraries that tests compare with
@@ -66,9 +66,9 @@ test: $(READY)  ## Run the tests
 test-all: $(READY)  ## Run the tests, slow ones too
 	$(BIN)/python -m pytest -n auto --dist loadfile -m 'not peers'
 
-test-peers: $(PEERS_READY)  ## Run the tests beside other libraries (JAX, pgmpy, pymdp, Stable-Baselines3), in .venv-peers
+test-peers: $(PEERS_READY)  ## Run the tests beside other libraries (JAX, pgmpy, pymdp, Stable-Baselines3, ap_gym), in .venv-peers
 	$(PEERS)/bin/python -m pytest -m peers tests/benchmarks/test_peers.py tests/experiments/test_recognition_agent.py \
-		tests/test_guides.py
+		tests/worlds/test_active_classification.py tests/test_guides.py
 
 torture: $(READY)  ## Kill writers, cut the power, fill disks, damage files, fuzz readers (some two hours on 2 cores)
 	$(BIN)/python -m pip install --quiet --group torture

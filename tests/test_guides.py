@@ -108,7 +108,7 @@ def test_the_guide_to_ones_own_engine_runs_and_prints_what_it_says(tmp_path, mon
 
 
 def test_the_loops_of_the_document_on_agents_run(capsys):
-    task, _, agent = blocks("agents.md")
+    task, _, _, agent = blocks("agents.md")
     run(task, "agents.md", variables := {})
     assert capsys.readouterr().out.split()[1] in ("novel", "known")
     variables["task"].close()
@@ -118,11 +118,19 @@ def test_the_loops_of_the_document_on_agents_run(capsys):
 
 
 @pytest.mark.peers
+@pytest.mark.filterwarnings("ignore")
+def test_our_recogniser_does_a_task_of_active_perception_gym(capsys):
+    pytest.importorskip("ap_gym", reason="ap_gym is not installed: pip install atg-fg[ap-gym]")
+    run(blocks("agents.md")[2], "agents.md", {})
+    assert capsys.readouterr().out == blocks("agents.md", "text")[0]
+
+
+@pytest.mark.peers
 @pytest.mark.filterwarnings("ignore::DeprecationWarning", "ignore::FutureWarning", "ignore::UserWarning")
 def test_an_agent_of_stable_baselines3_is_trained_and_scored(tmp_path, monkeypatch, capsys):
     pytest.importorskip("stable_baselines3", reason="Stable-Baselines3 is not installed: pip install atg-fg[agents]")
     monkeypatch.chdir(tmp_path)
-    task, agent, _ = blocks("agents.md")
+    task, agent, *_ = blocks("agents.md")
     run(task + agent, "agents.md", {})
     assert "TestResult(seed=0" in capsys.readouterr().out
     module, command = blocks("agents.md", "sh")[0].splitlines()

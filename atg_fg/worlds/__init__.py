@@ -7,6 +7,11 @@ import gymnasium
 
 gymnasium.register(id="atg_fg/ARcube-v0", entry_point="atg_fg.worlds.arcube_world:ARcubeWorld")
 gymnasium.register(id="atg_fg/Detector-v0", entry_point="atg_fg.worlds.detector_world:DetectorWorld")
+gymnasium.register(
+    id="atg_fg/ActiveClassification-v0",
+    entry_point="atg_fg.worlds.active_classification:ActiveClassificationWorld",
+    max_episode_steps=10,
+)
 
 for _id, _family in {
     "HexagonalPrism": "prism",
