@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Sequence
-from typing import Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
-import networkx
 import numpy as np
 
 from atg_fg.core.assumptions import MAX_NUMBER, Assumptions
@@ -16,6 +15,9 @@ from atg_fg.core.object_sense import Moments, check_measured
 from atg_fg.core.open_alphabets import Relabelling
 from atg_fg.core.patterns import IntArray, Measured, Pattern
 from atg_fg.core.table import Cell, Table, shortened
+
+if TYPE_CHECKING:
+    import networkx
 
 #: Node of the networkx view that stands for all unobserved aspects.
 COLLECTION_NODE = "collection"
@@ -235,6 +237,8 @@ class AspectTransitionGraph:
         attribute ``size`` while aspects are unobserved. Edges carry ``action``, ``count`` and ``observed``;
         an unknown transition is drawn to the collection node with count 0.
         """
+        import networkx  # it takes a tenth of a second
+
         graph: networkx.MultiDiGraph[int | str] = networkx.MultiDiGraph(name=self.name)
         for aspect, pattern in enumerate(self.aspects):
             graph.add_node(aspect, pattern=pattern)

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TypeAlias
+from typing import TYPE_CHECKING, TypeAlias
 
-import networkx
 import numpy as np
 
 from atg_fg.core.aspect_graph import AspectTransitionGraph, Edge
 from atg_fg.inference.recognition_model import COLLECTION, RecognitionModel
+
+if TYPE_CHECKING:
+    import networkx
 
 TransitionGraph: TypeAlias = "networkx.MultiDiGraph[int]"
 
@@ -25,6 +27,8 @@ def transition_graph(
         concentration: α.
         n_aspects: |G|.
     """
+    import networkx  # it takes a tenth of a second
+
     graph: TransitionGraph = networkx.MultiDiGraph()
     for aspect, pattern in patterns.items():
         graph.add_node(aspect, pattern=pattern)

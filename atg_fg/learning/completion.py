@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Sequence
-from typing import Any, Final, TypeAlias
+from typing import TYPE_CHECKING, Any, Final, TypeAlias
 
-import networkx
 import numpy as np
 
 from atg_fg.core.aspect_graph import AspectTransitionGraph
@@ -17,6 +16,9 @@ from atg_fg.learning.rates import Rates
 from atg_fg.learning.register_contents import symbol_probabilities
 from atg_fg.learning.shared_structure import Poses
 from atg_fg.learning.structured_memory import StructuredMemory
+
+if TYPE_CHECKING:
+    import networkx
 
 #: Nodes are the observed aspects by index, and "pose-3" for a pose that shows none of them.
 CompletedGraph: TypeAlias = "networkx.MultiDiGraph[int | str]"
@@ -44,6 +46,8 @@ def pose_graph(poses: Poses, contents: FloatArray, rates: Rates, alphabet: Patte
         rates: Slips and repeated symbols.
         alphabet: The patterns.
     """
+    import networkx  # it takes a tenth of a second
+
     probability, patterns = most_probable_patterns(poses, contents, rates, alphabet)
     graph: TransitionGraph = networkx.MultiDiGraph()
     for pose, (pattern, certainty) in enumerate(zip(patterns.tolist(), probability.tolist(), strict=True)):
@@ -113,6 +117,8 @@ def completed_atg(
 
 def _observed(graph: AspectTransitionGraph) -> CompletedGraph:
     """Return what was observed of an object, marked as such."""
+    import networkx  # it takes a tenth of a second
+
     completed: CompletedGraph = networkx.MultiDiGraph(name=graph.name, follows=0.0, poses=0)
     for aspect, pattern in enumerate(graph.aspects):
         completed.add_node(aspect, status=OBSERVED, pattern=pattern, symbols=pattern, probability=1.0, poses=())

@@ -14,14 +14,16 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
-import networkx
 import numpy as np
 from numpy.typing import NDArray
 
 from atg_fg.core.errors import InvalidInputError, TooLargeError
 from atg_fg.core.patterns import FloatArray, IntArray
+
+if TYPE_CHECKING:
+    import networkx
 
 #: A structure with more poses than this is not believed.
 MAX_POSES: Final = 200
@@ -183,6 +185,8 @@ class SharedStructure:
     def to_networkx(self) -> networkx.MultiDiGraph[int]:
         """Return the poses as nodes with ``registers``, those at each place, and an edge with ``action`` an action."""
         poses = self.poses()
+        import networkx  # it takes a tenth of a second
+
         graph: networkx.MultiDiGraph[int] = networkx.MultiDiGraph()
         for pose, registers in enumerate(poses.registers.tolist()):
             graph.add_node(pose, registers=tuple(registers))
@@ -325,6 +329,8 @@ def _minimal(poses: Poses, classes: IntArray, n_slots: int) -> Poses:
     name = np.argsort(order)[name.reshape(-1)]
     kept = kept[order]
     # Poses are of one class if they were, or if poses that look alike for ever were.
+    import networkx  # it takes a tenth of a second
+
     joined: networkx.Graph[int] = networkx.Graph(list(zip(name.tolist(), name[classes].tolist(), strict=True)))
     by_class = np.zeros(len(kept), dtype=np.int64)
     for members in networkx.connected_components(joined):

@@ -9,15 +9,17 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Collection
-from typing import Final, NamedTuple
+from typing import TYPE_CHECKING, Final, NamedTuple
 
-import networkx
 import numpy as np
 
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.goals import Goal
 from atg_fg.core.patterns import FloatArray
 from atg_fg.inference.known_transitions import TransitionGraph
+
+if TYPE_CHECKING:
+    import networkx
 
 #: Among paths of the same probability the one with fewer actions is better; this is too little to change any other.
 _TIE_BREAK: Final = 1e-9
@@ -93,6 +95,8 @@ def action_costs(graph: TransitionGraph, targets: Collection[int], n_actions: in
 
     That is the cost of the action's edge and of the shortest path from where it leads; ∞ where no known path leads on.
     """
+    import networkx  # it takes a tenth of a second
+
     costs = {aspect: np.full(n_actions, np.inf) for aspect in graph}
     if not targets:
         return costs
@@ -124,6 +128,8 @@ def exploration_costs(graph: TransitionGraph, n_actions: int, cost: str) -> dict
 
 def _cheapest_edges(graph: TransitionGraph, cost: str) -> networkx.DiGraph[int]:
     """Return the graph with only the action of least cost between each two aspects, and its ``cost`` on the edge."""
+    import networkx  # it takes a tenth of a second
+
     if cost not in COSTS:
         raise unknown_name("cost of a path", cost, COSTS)
     cheapest: networkx.DiGraph[int] = networkx.DiGraph()
@@ -137,6 +143,8 @@ def _cheapest_edges(graph: TransitionGraph, cost: str) -> networkx.DiGraph[int]:
 
 def _cheapest_paths(graph: TransitionGraph, source: int, cost: str) -> dict[int, GoalPath]:
     """Return the path of least cost from an aspect to each that can be reached, itself included."""
+    import networkx  # it takes a tenth of a second
+
     if source not in graph:
         raise InvalidInputError(f"aspect: {source!r}; expected one of {sorted(graph)}")
     best = _cheapest_edges(graph, cost)
