@@ -16,10 +16,9 @@ from atg_fg.core.actions import AnyAction, UncertainAction
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.compact.columns import positions
 from atg_fg.core.compact.compact_memory import GraphArrays
-from atg_fg.core.log_math import log_of
+from atg_fg.core.log_math import log_of, log_sum_exp
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, FloatArray, IntArray
-from atg_fg.inference.history import History
 from atg_fg.inference.recognition_model import COLLECTION
 
 
@@ -275,20 +274,18 @@ class AspectFilter:
         cells[rows] = rows * self.width + states
         return cells
 
-    def follow(self, history: History, since: int = 0, until: int | None = None) -> None:
-        """Go through a trial from after its first ``since`` looks to its end, or to before its look at ``until``."""
-        end = len(history.evidence) if until is None else until
-        for time in range(since, end):
-            if time:
-                self.predict(history.actions[time - 1])
-            self.accept(self.looked(history.evidence[time]))
-            self.learn_from(history, time)
-        if 0 < end <= len(history.actions):
-            self.predict(history.actions[end - 1])
+    def take_in(self, evidence: Evidence, seen: tuple[int | None, int | None, int | None]) -> float:
+        """Take in a look and learn from it; return ln p(one of the rows, z_0:t), or −∞ with nothing changed."""
+        looked = self.looked(evidence)
+        log_total = log_sum_exp(looked.log_weight)
+        if np.isfinite(log_total):
+            self.accept(looked)
+            self.learn(*seen)
+        return log_total
 
-    def learn_from(self, history: History, time: int) -> None:
-        """Learn from the look at a time of a trial, as ``RecognitionModel.learn_from`` does."""
-        self.learn(*history.step(time))
+    def rule_out(self) -> None:
+        """Let all rows be impossible from here on."""
+        self.log_weight = np.full_like(self.log_weight, -np.inf)
 
     def absorb(self, other: AspectFilter) -> None:
         """Add the rows of a filter that has gone through the same trial."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import ClassVar, Final, NamedTuple
+from typing import Any, ClassVar, Final, NamedTuple, Protocol
 
 import numpy as np
 
@@ -15,11 +15,20 @@ from atg_fg.core.log_math import log_of, log_sum_exp
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.patterns import Evidence, FloatArray, IntArray
 from atg_fg.engines.large_memory.aspect_filter import AspectFilter
-from atg_fg.engines.large_memory.decision import by_class, entropy_bound, expected_entropies, is_decided, one_by_one
+from atg_fg.engines.large_memory.decision import (
+    NextLooks,
+    by_class,
+    entropy_bound,
+    expected_entropies,
+    is_decided,
+    one_by_one,
+)
 from atg_fg.engines.large_memory.never_matched import ClassMasses, NeverMatched
 from atg_fg.engines.tables_on_demand import MAX_CELLS, TablesOnDemand
 from atg_fg.inference.chain import build_chain, forward_backward
+from atg_fg.inference.history import History
 from atg_fg.inference.interface import Inference, TrialSetup
+from atg_fg.inference.kernels import compilation
 
 #: So few objects are not worth an approximation.
 FEW: Final = 1000
@@ -31,6 +40,30 @@ class Decision(NamedTuple):
     expected: FloatArray
     bound: float
     fell_back: bool
+
+
+class Rows(Protocol):
+    """Objects that are filtered one by one, in NumPy or in compiled loops."""
+
+    @property
+    def mass(self) -> FloatArray:
+        """p(X_t | row), shape [R, W]."""
+
+    @property
+    def log_weight(self) -> FloatArray:
+        """Ln p(row, z_0:t), shape [R]."""
+
+    def predict(self, action: AnyAction) -> None:
+        """Take in an action that is sure, or that nothing happened."""
+
+    def take_in(self, evidence: Evidence, seen: tuple[int | None, int | None, int | None]) -> float:
+        """Take in a look and learn from it; return ln p(one of the rows, z_0:t), or −∞ with nothing changed."""
+
+    def rule_out(self) -> None:
+        """Let all rows be impossible from here on."""
+
+    def absorb(self, other: Any) -> None:
+        """Add the rows of a filter of this kind that has gone through the same trial."""
 
 
 class LargeMemory(Inference):
@@ -76,7 +109,7 @@ class LargeMemory(Inference):
         self._compact = CompactMemory.of(self.memory)
         self._log_total = 0.0
         self._decision: Decision | None = None
-        self._all: AspectFilter | None = None
+        self._all: Rows | None = None
         self._n_followed = 0
         self._classes: NeverMatched | None = None
         #: index of the object in each row of ``_matched`` but the first, which is *unseen*
@@ -94,7 +127,7 @@ class LargeMemory(Inference):
         """Return the tables in force when the trial begins."""
         return TablesOnDemand(self.memory, self.parameters, self.prior, max_cells=MAX_CELLS)
 
-    def _filter_of(self, objects: IntArray, *, unseen: bool = False) -> AspectFilter:
+    def _filter_of(self, objects: IntArray, *, unseen: bool = False) -> Rows:
         """Return a filter of some objects, and of *unseen* before them, at the beginning of the trial."""
         graphs = self._compact.arrays(objects)
         chosen = objects
@@ -102,33 +135,38 @@ class LargeMemory(Inference):
             chosen = np.append(len(self._compact), objects)
             n_known, n_edges = (np.append(0, part).astype(np.int64) for part in (graphs.n_known, graphs.n_edges))
             graphs = GraphArrays(n_known, graphs.patterns, n_edges, *graphs[3:])
-        return AspectFilter(self.memory.assumptions, self.parameters, graphs, log_of(self.model.prior[chosen]))
+        prior = self.model.prior[chosen]
+        if not compilation.are_wanted():
+            return AspectFilter(self.memory.assumptions, self.parameters, graphs, log_of(prior))
+        from atg_fg.engines.large_memory.matched_rows import MatchedRows  # it loads Numba
 
-    def _filters(self) -> list[AspectFilter]:
+        return MatchedRows(self.memory.assumptions, self.parameters, graphs, prior)
+
+    def _filters(self) -> list[Rows]:
         return [self._matched] if self._classes is None else [self._matched, self._classes.filter]
 
     def update(self, evidence: Evidence) -> None:
         """Condition on a look, the last of ``history``, and learn from it."""
         time = len(self.history.evidence) - 1
+        seen = self.history.step(time)
         objects = self._first_matches(evidence)
         filters = [self._matched]
         if len(objects):
             joining = self._filter_of(objects)
-            joining.follow(self.history, until=time)
+            _follow(joining, self.history, until=time)
             filters.append(joining)
-        looked = [each.looked(evidence) for each in filters]
-        log_weights = [each.log_weight for each in looked]
-        classes = self._classes
+        log_weights, classes = np.zeros(0), self._classes
         if classes is not None:
             members = classes.members - np.bincount(self._class_of[objects], minlength=classes.n_classes)
             of_classes = classes.filter.looked(evidence)
-            log_weights.append(classes.log_of_classes(of_classes.log_weight, members))
-        log_total = log_sum_exp(np.concatenate(log_weights))
+            log_weights = classes.log_of_classes(of_classes.log_weight, members)
+        log_totals = [each.take_in(evidence, seen) for each in filters]
+        log_total = log_sum_exp(np.append(log_weights, log_totals))
         if not np.isfinite(log_total):
-            raise self.impossible_evidence()
-        # From here on nothing is refused any more.
-        for each, after in zip(filters, looked, strict=True):
-            each.accept(after)
+            raise self.impossible_evidence()  # which has left the filters as they were
+        for each, own in zip(filters, log_totals, strict=True):
+            if not np.isfinite(own):
+                each.rule_out()
         if classes is not None:
             classes.filter.accept(of_classes)
             if len(objects):
@@ -136,11 +174,10 @@ class LargeMemory(Inference):
                 self._is_matched[objects] = True
                 self._objects = np.append(self._objects, objects)
                 self._matched.absorb(joining)
+            classes.filter.learn(*seen)
         self._log_total = log_total
         self._decision = None
         self.learn_from_look()
-        for each in self._filters():
-            each.learn_from(self.history, time)
 
     def _first_matches(self, evidence: Evidence) -> IntArray:
         """Return the objects that know a pattern which this look allows, and none of those before, shape [M]."""
@@ -228,25 +265,26 @@ class LargeMemory(Inference):
         classes, n_unseen = self._classes, self.model.n_unseen
         unseen = float(weights[0])
         if classes is None:
-            parts = [one_by_one(self._matched, weights, exact=True)]
+            parts = [_next_looks(self._matched, weights, exact=True)]
             return Decision(expected_entropies(parts, unseen, n_unseen), 0.0, fell_back=False)
         of_classes = by_class(classes, self._masses())
-        for exact in (True,) if len(weights) <= FEW else (False, True):
-            parts = [one_by_one(self._matched, weights, exact=exact), of_classes]
+        is_quick = len(weights) <= FEW or not isinstance(self._matched, AspectFilter)
+        for exact in (True,) if is_quick else (False, True):
+            parts = [_next_looks(self._matched, weights, exact=exact), of_classes]
             expected = expected_entropies(parts, unseen, n_unseen)
             bound = entropy_bound(sum(part.unsure for part in parts), len(self._compact) + n_unseen)
             if is_decided(expected, bound):
                 return Decision(expected, bound, fell_back=False)
         everything = self._filter_of_all()
         weights = np.exp(everything.log_weight - log_sum_exp(everything.log_weight))
-        parts = [one_by_one(everything, weights, exact=True)]
+        parts = [_next_looks(everything, weights, exact=True)]
         return Decision(expected_entropies(parts, float(weights[0]), n_unseen), 0.0, fell_back=True)
 
-    def _filter_of_all(self) -> AspectFilter:
+    def _filter_of_all(self) -> Rows:
         """Return the exact filter of all objects after the last look; it is kept, and goes on from where it was."""
         if self._all is None:
             self._all = self._filter_of(np.arange(len(self._compact)), unseen=True)
-        self._all.follow(self.history, self._n_followed)
+        _follow(self._all, self.history, self._n_followed)
         self._n_followed = len(self.history.evidence)
         return self._all
 
@@ -260,8 +298,8 @@ class LargeMemory(Inference):
         joint = np.zeros((self.model.n_hypotheses, self.model.n_states))
         matched = self._matched
         weights = np.exp(matched.log_weight - self._log_total)
-        width = min(matched.width, joint.shape[1])
-        joint[np.append(len(self._compact), self._objects), :width] = (matched.mass * weights[:, None])[:, :width]
+        mass = matched.mass[:, : joint.shape[1]] * weights[:, None]
+        joint[np.append(len(self._compact), self._objects), : mass.shape[1]] = mass
         if self._classes is not None:
             masses = self._masses()
             for number in np.flatnonzero(~self._is_matched):
@@ -275,3 +313,23 @@ class LargeMemory(Inference):
         known = hypothesis < len(self._compact)
         alone = RobotMemory(self.memory.assumptions, [self._compact.graph(hypothesis)] if known else [])
         return forward_backward(build_chain(alone, self.parameters, self.history, [0]))
+
+
+def _follow(rows: Rows, history: History, since: int = 0, until: int | None = None) -> None:
+    """Take a filter through a trial from after its first ``since`` looks to its end, or to before a look."""
+    end = len(history.evidence) if until is None else until
+    for time in range(since, end):
+        if time:
+            rows.predict(history.actions[time - 1])
+        if rows.take_in(history.evidence[time], history.step(time)) == -np.inf:
+            rows.rule_out()
+    if 0 < end <= len(history.actions):
+        rows.predict(history.actions[end - 1])
+
+
+def _next_looks(rows: Rows, weights: FloatArray, *, exact: bool) -> NextLooks:
+    """Return the next looks of objects one by one; compiled loops follow all edges as quickly as a few."""
+    if isinstance(rows, AspectFilter):
+        return one_by_one(rows, weights, exact=exact)
+    predictive, terms = rows.next_looks(weights)  # type: ignore[attr-defined]
+    return NextLooks(predictive, terms, 0.0)

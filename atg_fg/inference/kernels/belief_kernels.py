@@ -89,6 +89,34 @@ def write_row(
 
 
 @compiled
+def write_rows(
+    tables: tuple[Any, ...],
+    n_patterns: IntArray,
+    patterns: IntArray,
+    n_counts: IntArray,
+    counts: IntArray,
+    room: int,
+    concentration: float,
+) -> None:
+    """Write what all hypotheses know, as ``write_row`` does, with room for so many more edges of each.
+
+    Args:
+        tables: ``Tables``, changed in place.
+        n_patterns: Aspects of each, shape [H].
+        patterns: Of these, one hypothesis after the other.
+        n_counts: Transitions of each, shape [H].
+        counts: Of these, one hypothesis after the other, shape [E', 4].
+        room: Of each.
+        concentration: α.
+    """
+    aspect, row, first = 0, 0, 0
+    for hypothesis in range(len(n_patterns)):
+        last_aspect, last_row = aspect + n_patterns[hypothesis], row + n_counts[hypothesis]
+        write_row(tables, hypothesis, first, patterns[aspect:last_aspect], counts[row:last_row], concentration)
+        aspect, row, first = last_aspect, last_row, first + n_counts[hypothesis] + room
+
+
+@compiled
 def weigh_all(tables: tuple[Any, ...], concentration: float) -> None:
     """Set what the counts of all rows of all hypotheses come to."""
     _, _, begins, edges, counted, probability = tables

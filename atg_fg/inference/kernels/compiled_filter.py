@@ -7,51 +7,48 @@ import math
 import numpy as np
 
 from atg_fg.core.actions import AnyAction, UncertainAction, mixed
-from atg_fg.core.log_math import log_sum_exp
+from atg_fg.core.assumptions import Assumptions
+from atg_fg.core.log_math import log_of, log_sum_exp
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import FloatArray
 from atg_fg.inference.kernels import belief_kernels as kernels
 from atg_fg.inference.kernels import decision_kernels
-from atg_fg.inference.kernels.memory_tables import ROOM, arrays_for_trial, with_more_room
+from atg_fg.inference.kernels.memory_tables import ROOM, TrialArrays, arrays_for_trial, with_more_room
 
 #: What there is to learn from a look: the pattern before, the action since then, the pattern seen.
 LookedAt = tuple[int | None, int | None, int | None]
 
 
-class CompiledFilter:
-    """p(O) and p(X_t | O) in one trial, and what each hypothesis knows, extended as the trial goes.
+class CompiledRows:
+    """p(O) and p(X_t | O) of some hypotheses in one trial, and what each of them knows, extended as the trial goes.
 
     What an action does to the belief is computed with the look after it, in one call.
 
     Args:
-        memory: The robot memory when the trial begins.
+        assumptions: |G|, actions and alphabet.
         parameters: α, δ and whether to learn within the trial.
-        prior: p(O), shape [H].
+        arrays: What the hypotheses know, with room for ``ROOM`` more aspects and edges, and room for p(X_t | O).
+        prior: p(O) of each, shape [H].
     """
 
-    def __init__(self, memory: RobotMemory, parameters: ModelParameters, prior: FloatArray) -> None:
-        assumptions = memory.assumptions
-        self._constants = kernels.Constants(
-            assumptions.n_aspects,
-            len(assumptions.alphabet),
-            float(parameters.transition_concentration),
-            float(parameters.observation_noise),
-        )
-        self._numbers = tuple(self._constants)
-        self._n_actions = len(assumptions.actions)
+    def __init__(
+        self, assumptions: Assumptions, parameters: ModelParameters, arrays: TrialArrays, prior: FloatArray
+    ) -> None:
+        self._constants = tuple(_constants(assumptions, parameters))
+        self._n_aspects, self._n_actions = assumptions.n_aspects, len(assumptions.actions)
+        self._n_patterns = len(assumptions.alphabet)
         self._learns = parameters.learn_in_trial
-        arrays = arrays_for_trial(memory, self._constants.concentration, self, extends=self._learns)
         self._tables, self._aspects = arrays
         self._arrays = tuple(self._tables)
         self._room = ROOM
         self._n_learned = 0
         #: p(O), shape [H]
         self.identity = prior.copy()
-        self._log_identity = np.log(prior, out=np.full_like(prior, -np.inf), where=prior > 0)
+        self._log_identity = log_of(prior)
         self._shown, self._shown_pattern = np.zeros(len(prior), self._tables.n_known.dtype), -1
         #: what has happened since the last look
-        self._action = kernels.BEGIN
+        self._action: int = kernels.BEGIN
 
     def state(self) -> tuple[FloatArray, FloatArray]:
         """Return ln p(O | z_0:t), shape [H], and p(X_t | O, z_0:t), shape [H, W], W as of the model's tables."""
@@ -87,7 +84,7 @@ class CompiledFilter:
             learned = (*counted, pattern, self._shown_pattern)
         belief = (self._aspects, self._log_identity, self.identity)
         log_probability = kernels.step(
-            self._arrays, self._numbers, belief, self._action, likelihood, learned, self._shown
+            self._arrays, self._constants, belief, self._action, likelihood, learned, self._shown
         )
         self._action = kernels.REST
         if learned[2] >= 0 and log_probability > -math.inf:
@@ -96,7 +93,7 @@ class CompiledFilter:
 
     def _make_room(self) -> None:
         """Move rows apart, twice as far as before."""
-        self._tables = with_more_room(self._tables, self._room, self._constants.n_aspects)
+        self._tables = with_more_room(self._tables, self._room, self._n_aspects)
         self._arrays = tuple(self._tables)
         self._room += self._room
         more = self._tables.pattern.shape[1] - self._aspects.shape[1]
@@ -114,19 +111,43 @@ class CompiledFilter:
     def _move(self) -> None:
         """Let the belief be that after what has happened since the last look."""
         if self._action != kernels.REST:
-            kernels.move(self._arrays, self._numbers, self._aspects, self._action)
+            kernels.move(self._arrays, self._constants, self._aspects, self._action)
             self._action = kernels.REST
 
     def _moved(self, aspects: FloatArray, action: int) -> FloatArray:
         moved = aspects.copy()
-        kernels.move(self._arrays, self._numbers, moved, action)
+        kernels.move(self._arrays, self._constants, moved, action)
         return moved
+
+
+class CompiledFilter(CompiledRows):
+    """The rows of all hypotheses: the remembered objects, and last *unseen*.
+
+    Args:
+        memory: The robot memory when the trial begins.
+        parameters: α, δ and whether to learn within the trial.
+        prior: p(O), shape [H].
+    """
+
+    def __init__(self, memory: RobotMemory, parameters: ModelParameters, prior: FloatArray) -> None:
+        alpha = float(parameters.transition_concentration)
+        arrays = arrays_for_trial(memory, alpha, self, extends=parameters.learn_in_trial)
+        super().__init__(memory.assumptions, parameters, arrays, prior)
 
     def expected_entropies(self, n_unseen: int) -> FloatArray:
         """Return eq. 3 for each action in nats, shape [A]."""
         self._move()
         expected = np.empty(self._n_actions)
         decision_kernels.expected_entropies(
-            self._arrays, self._numbers, self._aspects, self.identity, math.log(n_unseen), expected
+            self._arrays, self._constants, self._aspects, self.identity, math.log(n_unseen), expected
         )
         return expected
+
+
+def _constants(assumptions: Assumptions, parameters: ModelParameters) -> kernels.Constants:
+    return kernels.Constants(
+        assumptions.n_aspects,
+        len(assumptions.alphabet),
+        float(parameters.transition_concentration),
+        float(parameters.observation_noise),
+    )

@@ -73,49 +73,48 @@ def _weighted_sum_x_log_x(values: FloatArray, weights: FloatArray, n_values: int
 
 
 @compiled
-def expected_entropies(
+def next_looks(
     tables: tuple[Any, ...],
     constants: tuple[Any, ...],
     aspects: FloatArray,
-    identity: FloatArray,
-    log_n_unseen: float,
-    expected: FloatArray,
+    weights: FloatArray,
+    predictive: FloatArray,
+    terms: FloatArray,
 ) -> None:
-    """Fill in eq. 3 of each action, nats, shape [A].
+    """Fill in Σ_i J and Σ_i Σ_z J ln J for J = p(O = i, z | a), shapes [A, |𝒵|] and [A].
 
     Args:
         tables: ``Tables``.
         constants: ``Constants``.
         aspects: p(X_t | O, z_0:t), shape [H, W].
-        identity: p(O | z_0:t), shape [H].
-        log_n_unseen: Ln U.
-        expected: Filled.
+        weights: p(O | z_0:t), shape [H].
+        predictive: Filled; rounding may leave some of it below zero.
+        terms: Filled.
     """
     n_known, pattern, begins, edges, _, edge_probability = tables
     n_aspects, n_patterns, _, delta = constants
-    n_hypotheses, n_actions, observed = len(identity), len(expected), 1.0 - delta
-    sums, everywhere = np.zeros(n_actions), np.zeros(n_actions)
-    more = np.empty(n_actions)
+    n_actions, observed = len(terms), 1.0 - delta
+    more, everywhere = np.empty(n_actions), np.zeros(n_actions)
     added = np.zeros((n_patterns, n_actions))
     reached, n_reached = np.empty((n_actions, _BLOCK)), np.zeros(n_actions, np.int64)
-    others, weights, n_others = np.empty((n_actions, _BLOCK)), np.empty((n_actions, _BLOCK)), 0
-    for hypothesis in range(n_hypotheses):
-        probability = identity[hypothesis]
-        n_own = n_known[hypothesis]
-        noise = delta / n_patterns * probability
+    others, factors, n_others = np.empty((n_actions, _BLOCK)), np.empty((n_actions, _BLOCK)), 0
+    terms[:] = 0.0
+    for hypothesis in range(len(weights)):
+        weight, n_own = weights[hypothesis], n_known[hypothesis]
+        noise = delta / n_patterns * weight
         rate = 0.0
         if n_own < n_aspects:
             rate = (n_aspects - n_own) / n_aspects * (observed / (n_patterns - n_own))
         if n_others + 2 > _BLOCK:
             for action in range(n_actions):
-                sums[action] += _weighted_sum_x_log_x(others[action], weights[action], n_others)
+                terms[action] += _weighted_sum_x_log_x(others[action], factors[action], n_others)
             n_others = 0
         for action in range(n_actions):
             edge, last = begins[hypothesis, action], begins[hypothesis, action + 1]
             term = n_reached[action]
             if term + last - edge > reached.shape[1]:
                 for each in range(n_actions):
-                    sums[each] += _sum_x_log_x(reached[each], n_reached[each])
+                    terms[each] += _sum_x_log_x(reached[each], n_reached[each])
                 n_reached[:] = 0
                 term = 0
                 if last - edge > reached.shape[1]:
@@ -129,11 +128,11 @@ def expected_entropies(
                     arrived += aspects[hypothesis, edges[edge, 1]] * edge_probability[edge]
                     edge += 1
                 left -= arrived
-                arrived *= observed * probability
+                arrived *= observed * weight
                 added[pattern[hypothesis, target], action] += arrived
                 reached[action, term] = arrived
                 term += 1
-            kept = max(left, 0.0) * probability
+            kept = max(left, 0.0) * weight
             unknown = kept * rate + noise
             unreached = kept * (observed / n_aspects) + noise
             for number in range(first, term):
@@ -141,19 +140,42 @@ def expected_entropies(
             n_reached[action] = term
             more[action] = unreached - unknown
             everywhere[action] += unknown
-            others[action, n_others], weights[action, n_others] = unknown, n_patterns - n_own
-            others[action, n_others + 1], weights[action, n_others + 1] = unreached, n_own - (term - first)
+            others[action, n_others], factors[action, n_others] = unknown, n_patterns - n_own
+            others[action, n_others + 1], factors[action, n_others + 1] = unreached, n_own - (term - first)
         n_others += 2
         for state in range(1, n_own + 1):
             known = pattern[hypothesis, state]
             for action in range(n_actions):
                 added[known, action] += more[action]
-    predictive = np.empty(n_patterns)
     for action in range(n_actions):
         for each in range(n_patterns):
-            # Subtracting may leave a rounding error below zero; that is put right with the logarithm.
-            predictive[each] = added[each, action] + everywhere[action]
-        joint = sums[action] + _sum_x_log_x(reached[action], n_reached[action])
-        joint += _weighted_sum_x_log_x(others[action], weights[action], n_others)
-        entropy = _sum_x_log_x(predictive, n_patterns) - joint + identity[n_hypotheses - 1] * log_n_unseen
-        expected[action] = max(entropy, 0.0)
+            predictive[action, each] = added[each, action] + everywhere[action]
+        terms[action] += _sum_x_log_x(reached[action], n_reached[action])
+        terms[action] += _weighted_sum_x_log_x(others[action], factors[action], n_others)
+
+
+@compiled
+def expected_entropies(
+    tables: tuple[Any, ...],
+    constants: tuple[Any, ...],
+    aspects: FloatArray,
+    identity: FloatArray,
+    log_n_unseen: float,
+    expected: FloatArray,
+) -> None:
+    """Fill in eq. 3 of each action, nats, shape [A].
+
+    Args:
+        tables: ``Tables``; the last hypothesis is *unseen*.
+        constants: ``Constants``.
+        aspects: p(X_t | O, z_0:t), shape [H, W].
+        identity: p(O | z_0:t), shape [H].
+        log_n_unseen: Ln U.
+        expected: Filled.
+    """
+    n_actions, n_patterns = len(expected), constants[1]
+    predictive = np.empty((n_actions, n_patterns))
+    next_looks(tables, constants, aspects, identity, predictive, expected)
+    for action in range(n_actions):
+        entropy = _sum_x_log_x(predictive[action], n_patterns) - expected[action]
+        expected[action] = max(entropy + identity[len(identity) - 1] * log_n_unseen, 0.0)

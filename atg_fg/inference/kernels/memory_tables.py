@@ -10,6 +10,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from atg_fg.core.aspect_graph import AspectTransitionGraph
+from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.compact.columns import positions
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.patterns import FloatArray
@@ -22,7 +23,8 @@ ROOM: Final = 12
 #: Rows that there is more room for, at most.
 _MOST_MORE: Final = 1000
 
-_Types = tuple[type[np.unsignedinteger[Any]], type[np.unsignedinteger[Any]]]
+#: Types of states and of patterns.
+Types = tuple[type[np.unsignedinteger[Any]], type[np.unsignedinteger[Any]]]
 
 #: Trials whose arrays are kept: one that has ended, and the one before it, as the next begins before it is gone.
 _SPARE: Final = 2
@@ -55,9 +57,7 @@ class MemoryTables:
     def __init__(self, memory: RobotMemory, concentration: float) -> None:
         self._n_aspects = memory.assumptions.n_aspects
         self._n_actions = len(memory.assumptions.actions)
-        is_small = max(self._n_aspects, self._n_actions) <= np.iinfo(np.uint8).max
-        is_small &= len(memory.assumptions.alphabet) <= np.iinfo(np.uint16).max
-        self._types: _Types = (np.uint8, np.uint16) if is_small else (np.uint32, np.uint32)
+        self._types = types_for(memory.assumptions)
         self._concentration = concentration
         self._lock = threading.RLock()
         self._tables: Tables
@@ -96,7 +96,7 @@ class MemoryTables:
 
     def _like_kept(self) -> TrialArrays:
         n_rows, width = shape = self._tables.pattern.shape
-        tables = _empty(n_rows, len(self._tables.counted), width, self._n_actions, self._types)
+        tables = empty_tables(n_rows, len(self._tables.counted), width, self._n_actions, self._types)
         return TrialArrays(tables, np.zeros(shape))
 
     def _take_back(self, lent: TrialArrays) -> None:
@@ -143,7 +143,7 @@ class MemoryTables:
         n_edges = sum(graph.n_counted for graph in graphs) + ROOM * n_rows
         more = min(16 + n_rows // 2, _MOST_MORE)
         width = 1 + min(max((graph.n_known for graph in graphs), default=0) + 2 * ROOM, self._n_aspects)
-        self._tables = _empty(n_rows + more, n_edges + 2 * ROOM * more, width, self._n_actions, self._types)
+        self._tables = empty_tables(n_rows + more, n_edges + 2 * ROOM * more, width, self._n_actions, self._types)
         self._n_edges = 0
         self._spare.clear()
         self._readers.clear()
@@ -164,7 +164,14 @@ def _part(tables: Tables, n_rows: int, n_edges: int) -> Tables:
     )
 
 
-def _empty(n_rows: int, n_edges: int, width: int, n_actions: int, types: _Types) -> Tables:
+def types_for(assumptions: Assumptions) -> Types:
+    """Return the types that arrays have: small ones where they do, and one other choice, as each is compiled anew."""
+    is_small = max(assumptions.n_aspects, len(assumptions.actions)) <= np.iinfo(np.uint8).max
+    is_small &= len(assumptions.alphabet) <= np.iinfo(np.uint16).max
+    return (np.uint8, np.uint16) if is_small else (np.uint32, np.uint32)
+
+
+def empty_tables(n_rows: int, n_edges: int, width: int, n_actions: int, types: Types) -> Tables:
     """Return tables of hypotheses that know nothing; the types are those of states and of patterns."""
     of_states, of_patterns = types
     return Tables(
@@ -184,7 +191,7 @@ def with_more_room(tables: Tables, room: int, n_aspects: int) -> Tables:
     width = 1 + min(int(tables.n_known.max()) + room, n_aspects)
     n_rows, before = tables.pattern.shape
     types = (tables.n_known.dtype.type, tables.pattern.dtype.type)
-    more = _empty(n_rows, int((n_edges + room).sum()), max(width, before), tables.begins.shape[1] - 1, types)
+    more = empty_tables(n_rows, int((n_edges + room).sum()), max(width, before), tables.begins.shape[1] - 1, types)
     there, here = positions(starts, n_edges), positions(tables.begins[:, 0], n_edges)
     for old, new in (
         (tables.edges, more.edges),
