@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Mapping
+from collections import Counter
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
+from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.assumptions import Assumptions, arcube_assumptions
 from atg_fg.core.errors import AtgError, InvalidInputError
 from atg_fg.core.memory import RobotMemory
@@ -69,8 +71,9 @@ def _joined(reports: list[Report], path: Path) -> Report:
 class _Taught:
     """The experiments of a database, one after the other.
 
-    What a memory was taught since it was empty is inferred again, as for a test. Where it was not empty at first, or
-    has learned something else besides, the ATGs are those of today.
+    What it was taught is taken off the memory of today, and the beliefs of its trials are inferred again from there, as
+    for a test. Where that does not lead to what was recorded, as it learned something else besides, the ATGs are those
+    of today.
 
     Args:
         path: The database.
@@ -80,9 +83,11 @@ class _Taught:
     def __init__(self, path: Path, memory: RobotMemory | None) -> None:
         self._path, self._memory = path, memory
         self._retelling: Retelling | None = None
+        taught = [trial for trial in read_stored_trials(path) if trial.learned is not None]
+        self._before = None if memory is None else _memory_before(memory, taught)
         # How many ATGs the memory had before the first trial: it has those of today, but for what it was taught since.
-        taught = sum(trial.verdict == "novel" and trial.learned is not None for trial in read_stored_trials(path))
-        self._n_remembered = 0 if memory is None else max(len(memory) + len(memory.merges) - taught, 0)
+        new = sum(trial.verdict == "novel" for trial in taught)
+        self._n_remembered = 0 if memory is None else max(len(memory) + len(memory.merges) - new, 0)
 
     def report(self, experiment: Experiment | None) -> Report | None:
         """Return the page of an experiment, or of the trials that belong to none; ``None`` if there are no trials."""
@@ -110,7 +115,8 @@ class _Taught:
 
     def _page(self, trial: TrialSummary, about: Mapping[str, Any], assumptions: Assumptions) -> TrialPage:
         if self._retelling is None:
-            self._retelling = Retelling(assumptions, inferred=True)
+            before = self._before if self._before is not None and self._before.assumptions == assumptions else None
+            self._retelling = Retelling(assumptions, inferred=True, memory=before)
         told, name = self._retelling, about.get("preset")
         parameters = PRESETS[name] if isinstance(name, str) and name in PRESETS else None
         told.inferred = told.inferred and parameters is not None and not parameters.learn_structure
@@ -136,3 +142,49 @@ class _Taught:
             looks=tuple(replace(look, graph=index) for look in looks_of(trial, n_unseen)),
             graphs=graphs.graphs,
         )
+
+
+def _memory_before(memory: RobotMemory, taught: Sequence[TrialSummary]) -> RobotMemory:
+    """Return what a memory held before it learned from trials: without the aspects and counts that they taught.
+
+    An aspect of which they alone showed a transition is taken for one that they taught. Of a memory that does not hold
+    what they taught, nothing is told: an empty one is returned.
+    """
+    born = {trial.learned for trial in taught if trial.verdict == "novel"}
+    own: dict[str, AspectTransitionGraph] = {}
+    before = RobotMemory(memory.assumptions)
+    try:
+        for trial in taught:
+            if trial.learned is not None:
+                graph = own.setdefault(trial.learned, AspectTransitionGraph(trial.learned, memory.assumptions))
+                actions = [memory.assumptions.action_index(name) for name in trial.actions[: len(trial.steps) - 1]]
+                graph.learn(list(trial.patterns), actions)
+        for graph in memory:
+            if graph.name not in born:
+                before.add(_without(graph, own[graph.name]) if graph.name in own else graph)
+    except AtgError:
+        return RobotMemory(memory.assumptions)
+    return before
+
+
+def _without(graph: AspectTransitionGraph, taught: AspectTransitionGraph) -> AspectTransitionGraph:
+    """Return a graph without what another one counted."""
+    counts = Counter(_by_pattern(graph))
+    counts.subtract(_by_pattern(taught))
+    shown = {pattern for (source, _, target), count in counts.items() if count for pattern in (source, target)}
+    kept = [pattern in shown or taught.aspect_showing(pattern) is None for pattern in graph.pattern_indices]
+    # Aspects stand in the order in which they were met.
+    n_known = len(kept) - kept[::-1].index(True) if any(kept) else 0
+    before = AspectTransitionGraph(graph.name, graph.assumptions)
+    for pattern in graph.aspects[:n_known]:
+        before.add_aspect(pattern)
+    for (source, action, target), count in counts.items():
+        start, end = before.aspect_showing(source), before.aspect_showing(target)
+        if count and start is not None and end is not None:
+            before.add_transition(start, action, end, count)
+    return before
+
+
+def _by_pattern(graph: AspectTransitionGraph) -> dict[tuple[int, int, int], int]:
+    patterns = graph.pattern_indices
+    return {(patterns[source], action, patterns[target]): n for (source, action, target), n in graph.counts.items()}

@@ -80,17 +80,21 @@ def with_mended(pages: Sequence[TrialPage], trials: Sequence[TrialSummary]) -> l
 
 
 class Retelling:
-    """The robot's memory, which was empty at first, and the score, trial after trial.
+    """The robot's memory and the score, trial after trial.
 
     Args:
         assumptions: Of all trials.
         inferred: Whether beliefs are inferred again; no longer, once they do not agree with what was recorded.
         merging: Whether the robot merged ATGs, so that it is not known how many it had.
+        memory: Before the first trial; an empty one if not given. Of which objects its ATGs are nobody knows.
     """
 
-    def __init__(self, assumptions: Assumptions, *, inferred: bool, merging: bool = False) -> None:
+    def __init__(
+        self, assumptions: Assumptions, *, inferred: bool, merging: bool = False, memory: RobotMemory | None = None
+    ) -> None:
         self._assumptions, self._merging = assumptions, merging
-        self._memory = RobotMemory(assumptions)
+        self._memory = memory or RobotMemory(assumptions)
+        self._was_empty = not len(self._memory)
         self.score = Score()
         self.inferred = inferred
 
@@ -109,12 +113,14 @@ class Retelling:
         looks = looks_of(trial, None if self._merging else self._memory.n_unseen)
         if self.inferred:
             looks = self._with_beliefs(looks, parameters, by_entropy=by_entropy)
-        met = "met before" if self.score.has_met(trial.object) else "never met before"
+        known = self.score.has_met(trial.object)
+        met = "met before" if known else "never met before" if self._was_empty else "in none of the trials before"
         truth = f"{told_truth(trial.truths[-1], self.score.name_of(trial.object))}, {met}"
         notes = told_mistakes(trial, self._assumptions)
         page = TrialPage(title, told_verdict(trial.verdict, trial.matched), truth, None, (), (), notes=notes)
         page = with_graphs(page, looks, self._memory if self.inferred else None, self._assumptions, trial.matched)
-        return replace(page, right=self.score.add(trial, learn_from(trial, self._memory)))
+        right = self.score.add(trial, learn_from(trial, self._memory))
+        return replace(page, right=right if known or self._was_empty else None)
 
     def _with_beliefs(self, looks: list[Look], parameters: ModelParameters, *, by_entropy: bool) -> list[Look]:
         """Return the looks with the belief over objects, if the memory leads to what was recorded."""

@@ -16,7 +16,7 @@ from atg_fg.experiments.table1 import TestPlan, run_test
 from atg_fg.experiments.trial import learn_from
 from atg_fg.report.experiments import EXPERIMENTS
 from atg_fg.report.reading import read_report
-from atg_fg.storage.memory_files import open_memory, save_memory
+from atg_fg.storage.memory_files import load_memory, open_memory, save_memory
 from atg_fg.storage.trial_log import read_log
 
 RESULTS = Path(__file__).parents[2] / "results"
@@ -92,6 +92,31 @@ def test_a_memory_that_was_empty_at_first_is_retold_with_beliefs_and_what_was_ri
     for look in third.looks:
         assert sum(share for _, share in look.objects) + look.unseen == pytest.approx(1.0, abs=1e-9)
     assert third.looks[-1].objects[0][0] == "object-000"
+
+
+def test_a_memory_that_was_not_empty_at_first_is_retold_from_what_it_held_then(run, tmp_path):
+    robot, about = tmp_path / "robot.json", ("--engine", "bayes-filter", "--preset", "default", "--actions", "6")
+    for seed in (2, 3):
+        given = ("--memory", robot) if robot.exists() else ()
+        assert run("trial", *given, "--save-memory", robot, "--seed", seed, *about)[0] == 0
+    at_first = load_memory(robot)
+    robot = tmp_path / "robot.db"
+    save_memory(at_first, robot)
+    for seed, record in ((1, "new"), (2, "known"), (1, "again")):
+        kept = ("--record", tmp_path / f"{record}.jsonl")
+        assert run("trial", "--memory", robot, "--save-memory", robot, "--seed", seed, *kept, *about)[0] == 0
+    report = read_report(robot)
+    assert report.notes == ()
+    for page, record in zip(report.trials, ("new", "known", "again"), strict=True):
+        (alone,) = read_report(tmp_path / f"{record}.jsonl").trials
+        assert page.verdict == alone.verdict
+        for look, recorded in zip(page.looks, alone.looks, strict=True):
+            assert dict(look.objects) == pytest.approx(dict(recorded.objects), abs=1e-9)
+    new, known, again = report.trials
+    # Whether an object of before the records is right, nobody can say; of those in the records, they can.
+    assert (new.right, known.right, again.right) == (None, None, True)
+    assert "in none of the trials before" in known.truth
+    assert (new.verdict, known.verdict, again.verdict) == ("a new object", "object-000", "object-002")
 
 
 def test_a_new_object_has_the_entropy_of_the_verdict(trial, record, test_log):
