@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Sequence
-from typing import Any
+from collections.abc import Collection, Iterable, Sequence
+from typing import Any, Final
 
 import numpy as np
 
 from atg_fg.core.errors import InvalidInputError
+
+#: Names that an error message tells.
+_LISTED: Final = 24
 
 
 def whole_number(value: Any, place: str, least: int = 0, most: int | None = None) -> int:
@@ -75,6 +78,13 @@ def plain_text(value: Any, place: str) -> str:
     except UnicodeError as error:  # JSON can say half a character
         raise InvalidInputError(f"{place}: {brief(value)}; expected a text of whole characters") from error
     return value
+
+
+def listed(names: Iterable[str]) -> str:
+    """Return names with commas between them; of many the first ones, and how many others there are."""
+    known = list(names)
+    more = f" and {len(known) - _LISTED} others" if len(known) > _LISTED else ""
+    return ", ".join(name if len(name) <= 60 else f"{name[:57]}..." for name in known[:_LISTED]) + more
 
 
 def brief(value: Any) -> str:

@@ -16,7 +16,7 @@ from typing import Any, Final, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from atg_fg.core.checks import brief, distinct_names, whole_number
+from atg_fg.core.checks import brief, distinct_names, listed, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.slot_checks import check_confidences, check_slots
 
@@ -135,7 +135,7 @@ class PatternAlphabet:
         """
         new = [name for name in dict.fromkeys(names) if name not in self._number_of]
         if new and not self.is_open:
-            raise InvalidInputError(f"symbol {new[0]!r}; expected one of: {', '.join(self.names)}")
+            raise InvalidInputError(f"symbol {brief(new[0])}; expected one of: {listed(self.names)}")
         return replace(self, n_symbols=self.n_symbols + len(new), names=(*self.names, *new)) if new else self
 
     @cached_property
@@ -212,7 +212,7 @@ class PatternAlphabet:
         if isinstance(detection, str) or not hasattr(detection, "__len__") or len(detection) != len(self.slots):
             raise InvalidInputError(
                 f"{place}: {brief(detection)}; expected one entry for each of {len(self.slots)} slots: "
-                f"{', '.join(self.slots)}"
+                f"{listed(self.slots)}"
             )
         symbols: list[int | None] = []
         for slot, symbol in zip(self.slots, detection, strict=True):
@@ -222,7 +222,7 @@ class PatternAlphabet:
             if isinstance(symbol, str) and self.names:
                 if symbol not in self._number_of:
                     raise InvalidInputError(
-                        f"{place}, slot {slot!r}: {brief(symbol)}; expected one of: {', '.join(self.names)}"
+                        f"{place}, slot {slot!r}: {brief(symbol)}; expected one of: {listed(self.names)}"
                     )
                 symbol = self._number_of[symbol]
             if isinstance(symbol, (bool, np.bool_)) or not isinstance(symbol, (int, np.integer)):

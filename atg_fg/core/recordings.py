@@ -9,6 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from atg_fg.core.assumptions import Assumptions
+from atg_fg.core.checks import listed
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import Evidence, PatternAlphabet
 
@@ -114,8 +115,8 @@ def check_fits(recording: Recording, assumptions: Assumptions) -> None:
     """
     if recording.slots != assumptions.alphabet.slots:
         raise InvalidInputError(
-            f"{recording.place}: slots {', '.join(recording.slots)}; expected those of the memory: "
-            f"{', '.join(assumptions.alphabet.slots)}"
+            f"{recording.place}: slots {listed(recording.slots)}; expected those of the memory: "
+            f"{listed(assumptions.alphabet.slots)}"
         )
     for trial in recording.trials:
         for step, action in enumerate(trial.actions):

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 import csv
 import math
+from collections import Counter
 from collections.abc import Iterator, Sequence
 from itertools import groupby
 from typing import Final, NamedTuple
 
-from atg_fg.core.checks import brief
+from atg_fg.core.checks import brief, listed
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.recordings import RecordedLook, RecordedTrial
 
@@ -22,6 +23,8 @@ _NEEDED: Final = FIXED[:3]
 _CONFIDENCE: Final = "confidence"
 #: Characters of a field; a longer one is no label.
 _LONGEST: Final = 1000
+#: Digits of a step.
+_LONGEST_STEP: Final = 18
 #: Faults that are kept of a file.
 MOST_FAULTS: Final = 1000
 
@@ -79,14 +82,12 @@ def columns_of(header: Sequence[str], slots: Sequence[str] | None = None) -> Csv
         InvalidInputError: A column is missing or repeated, or belongs to no slot.
     """
     names = [name.strip() for name in header]
-    for name in names:
-        if names.count(name) > 1:
-            raise InvalidInputError(f"line 1: column {brief(name)} is repeated; expected unique columns")
+    name, times = Counter(names).most_common(1)[0]
+    if times > 1:
+        raise InvalidInputError(f"line 1: column {brief(name)} is repeated; expected unique columns")
     for needed in _NEEDED:
         if needed not in names:
-            raise InvalidInputError(
-                f"line 1: no column {needed!r} in {', '.join(names)}; expected {', '.join(_NEEDED)}"
-            )
+            raise InvalidInputError(f"line 1: no column {needed!r} in {listed(names)}; expected {', '.join(_NEEDED)}")
     plain = [name for name in names if name not in FIXED and ":" not in name and "=" not in name]
     weighted = [name.partition("=")[0] for name in names if "=" in name]
     lone = [name for name in plain if name != _CONFIDENCE]
@@ -94,24 +95,27 @@ def columns_of(header: Sequence[str], slots: Sequence[str] | None = None) -> Csv
         plain = lone
     owned = list(dict.fromkeys([*plain, *weighted]) if slots is None else slots)
     if not owned:
-        raise InvalidInputError(f"line 1: no slot in {', '.join(names)}; expected a column for what is seen")
-    for slot in owned:
-        if slot not in names and slot not in weighted:
-            raise InvalidInputError(f"line 1: no column for slot {slot!r} in {', '.join(names)}; expected one")
-    for name in names:
-        owner, colon, kind = name.partition(":")
-        if colon and "=" not in name and (kind != _CONFIDENCE or owner not in owned):
-            raise InvalidInputError(f"line 1: column {name!r}; expected SLOT:confidence of a slot: {', '.join(owned)}")
+        raise InvalidInputError(f"line 1: no slot in {listed(names)}; expected a column for what is seen")
     number = {name: index for index, name in enumerate(names)}
+    weights: dict[str, list[tuple[int, str]]] = {slot: [] for slot in owned}
+    for name, index in number.items():
+        owner, equals, label = name.partition("=")
+        if equals and owner in weights:
+            weights[owner].append((index, label))
+        owner, colon, kind = name.partition(":")
+        if colon and not equals and (kind != _CONFIDENCE or owner not in weights):
+            raise InvalidInputError(
+                f"line 1: column {brief(name)}; expected SLOT:confidence of a slot: {listed(owned)}"
+            )
+    for slot in owned:
+        if slot not in number and not weights[slot]:
+            raise InvalidInputError(f"line 1: no column for slot {slot!r} in {listed(names)}; expected one")
     alone = number.get(_CONFIDENCE) if len(owned) == 1 and _CONFIDENCE not in owned else None
     return CsvColumns(
         tuple(owned),
         tuple(number.get(slot) for slot in owned),
         tuple(number.get(f"{slot}:{_CONFIDENCE}", alone) for slot in owned),
-        tuple(
-            tuple((index, name.partition("=")[2]) for name, index in number.items() if name.startswith(f"{slot}="))
-            for slot in owned
-        ),
+        tuple(tuple(weights[slot]) for slot in owned),
         {name: number[name] for name in FIXED if name in number},
         len(names),
     )
@@ -142,8 +146,8 @@ class CsvReader:
         first = lines.partition("\n")[0]
         self._delimiter = max(",;\t", key=first.count)
         self._rows = csv.reader(lines.split("\n"), delimiter=self._delimiter, strict=True)
-        self._labels = None if labels is None else set(labels)
-        self._actions = None if actions is None else set(actions)
+        self._labels = None if labels is None else dict.fromkeys(sorted(labels))
+        self._actions = None if actions is None else dict.fromkeys(sorted(actions))
         self.faults: list[Fault] = []
         self._is_fatal = False
         header = next(self._rows, None)
@@ -201,9 +205,9 @@ class CsvReader:
 
     def _check_step(self, line: int, step: str, number: int, rows: list[tuple[int, list[str]]]) -> None:
         first = rows[0][1][self.columns.fixed["step"]].strip()
-        if not (step.isascii() and step.isdigit()):
+        if not _is_step(step):
             self._fault("no step", line, "step", f"{brief(step)}; expected a whole number")
-        elif first.isascii() and first.isdigit() and int(step) != int(first) + number:
+        elif _is_step(first) and int(step) != int(first) + number:
             kind = "missing step" if int(step) > int(first) + number else "steps out of order"
             self._fault(kind, line, "step", f"{step}; expected {int(first) + number}, one more than before")
 
@@ -211,8 +215,7 @@ class CsvReader:
         if not action:
             self._fault("no action", line, "action", "empty; expected what was done before the next look")
         elif self._actions is not None and action not in self._actions:
-            known = ", ".join(sorted(self._actions))
-            self._fault("unknown action", line, "action", f"{brief(action)}; expected one of: {known}")
+            self._fault("unknown action", line, "action", f"{brief(action)}; expected one of: {listed(self._actions)}")
 
     def _look(self, line: int, row: list[str]) -> RecordedLook:
         columns = self.columns
@@ -241,8 +244,7 @@ class CsvReader:
             self._fault("long label", line, slot, f"{len(label)} characters; expected at most {_LONGEST}")
             return None
         if self._labels is not None and label not in self._labels:
-            known = ", ".join(sorted(self._labels))
-            self._fault("unknown label", line, slot, f"{brief(label)}; expected one of: {known}")
+            self._fault("unknown label", line, slot, f"{brief(label)}; expected one of: {listed(self._labels)}")
             return None
         return label
 
@@ -299,6 +301,10 @@ def write_csv(slots: Sequence[str], trials: Sequence[RecordedTrial]) -> str:
                 row += [repr(weights[name]) if name in weights else "" for name in by_label[slot]]
             lines.append(row + ([trial.object or ""] if named else []))
     return "".join(f"{','.join(map(_quoted, line))}\n" for line in lines)
+
+
+def _is_step(text: str) -> bool:
+    return text.isascii() and text.isdigit() and len(text) <= _LONGEST_STEP
 
 
 def _weights(look: RecordedLook, slot: int) -> dict[str, float]:

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from atg_fg.core.checks import brief, number, plain_text, whole_number
+from atg_fg.core.checks import brief, listed, number, plain_text, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.recordings import RecordedLook, RecordedTrial, Recording, used_labels
 from atg_fg.storage.checked_json import check_format, parse_json, read_list, read_object, without_none
@@ -119,14 +119,16 @@ def completed(recording: Recording, spec: RecordingSpec) -> Recording:
         InvalidInputError: It has other slots, or labels or actions that the spec does not know.
     """
     if spec.slots not in (None, recording.slots):
-        raise InvalidInputError(f"{recording.place}: slots {', '.join(recording.slots)}; expected {spec.slots}")
+        raise InvalidInputError(
+            f"{recording.place}: slots {listed(recording.slots)}; expected {listed(spec.slots or ())}"
+        )
     for kind, found, known in (
         ("label", recording.labels, spec.labels),
         ("action", recording.actions, spec.actions),
     ):
         for name in found:
             if known is not None and name not in known:
-                raise InvalidInputError(f"{recording.place}: {kind} {name!r}; expected one of: {', '.join(known)}")
+                raise InvalidInputError(f"{recording.place}: {kind} {brief(name)}; expected one of: {listed(known)}")
     return _made(recording.trials, spec._replace(slots=recording.slots), recording.labels, recording.place)
 
 
@@ -216,7 +218,7 @@ def _read_trial(value: Any, place: str, spec: RecordingSpec) -> RecordedTrial:
         plain_text(action, f"{place}: actions[{index}]")
         if spec.actions is not None and action not in spec.actions:
             raise InvalidInputError(
-                f"{place}: actions[{index}]: {brief(action)}; expected one of: {', '.join(spec.actions)}"
+                f"{place}: actions[{index}]: {brief(action)}; expected one of: {listed(spec.actions)}"
             )
     stated = read_list(fields.get("confidences", [[]] * len(looks)), f"{place}: confidences")
     if len(stated) != len(looks):
@@ -242,7 +244,7 @@ def _read_look(value: Any, sure: Any, slots: tuple[str, ...], place: str, spec: 
     stated = read_list([] if sure is None else sure, f"{place}: confidences")
     if len(entries) != len(slots) or len(stated) not in (0, len(slots)):
         raise InvalidInputError(
-            f"{place}: {brief(value)}, {brief(sure)}; expected an entry for each of {', '.join(slots)}"
+            f"{place}: {brief(value)}, {brief(sure)}; expected an entry for each of {listed(slots)}"
         )
     labels: list[str | None] = []
     weights: list[Mapping[str, float] | None] = []
@@ -252,7 +254,7 @@ def _read_look(value: Any, sure: Any, slots: tuple[str, ...], place: str, spec: 
         for label, weight in given.items():
             number(weight, f"{where}: {label}", 0.0)
             if spec.labels is not None and label not in spec.labels:
-                raise InvalidInputError(f"{where}: {brief(label)}; expected one of: {', '.join(spec.labels)}")
+                raise InvalidInputError(f"{where}: {brief(label)}; expected one of: {listed(spec.labels)}")
         if isinstance(entry, dict) and not any(given.values()):
             raise InvalidInputError(f"{where}: {brief(entry)}; expected a likelihood above 0")
         labels.append(entry if isinstance(entry, str) else None)
