@@ -191,7 +191,7 @@ def _reliability_table(title: str, summary: dict[str, Any]) -> Table:
     if boxes:
         spreads["box found off by, mm"] = (boxes["position_error_metres"], 1000.0)
         spreads["box found turned off by, degrees"] = (boxes["yaw_error_degrees"], 1.0)
-        spreads["weighed too heavy, %"] = (boxes["mass_error"] or {}, 100.0)
+        spreads["weighed too heavy, g"] = (boxes["mass_error_kilograms"] or {}, 1000.0)
     for name, (spread, unit) in spreads.items():
         texts = (f"{key} {unit * value:.2f}" for key, value in spread.items() if value is not None)
         table.add_row(name, *texts)

@@ -58,7 +58,7 @@ class Fit:
     Attributes:
         position_error: m; ``None`` if it was not found.
         yaw_error: Of its angle about the vertical, degrees; ``None`` if it was not found.
-        mass_error: Share of its mass that it was weighed too heavy; ``None`` if it was not weighed.
+        mass_error: What it was weighed too heavy, kg; ``None`` if it was not weighed.
     """
 
     position_error: float | None
@@ -252,7 +252,7 @@ def _of_looks(looks: Sequence[Look], fits: Sequence[Fit]) -> dict[str, Any]:
             "position_error_metres": _spread(fit.position_error for fit in fits if fit.position_error is not None),
             "yaw_error_degrees": _spread(fit.yaw_error for fit in fits if fit.yaw_error is not None),
             "weighed": len(off),
-            "mass_error": {"mean": float(np.mean(off)), "deviation": float(np.std(off))} if off else None,
+            "mass_error_kilograms": {"mean": float(np.mean(off)), "deviation": float(np.std(off))} if off else None,
         }
     }
 

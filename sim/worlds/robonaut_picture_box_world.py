@@ -67,11 +67,11 @@ class RobonautPictureBoxWorld(RobonautWorld, BoxesWithPictures):
         return beside(drawn, self.crops)
 
     def errors(self) -> dict[str, float | None]:
-        """Return how far off the truth the last look and the last action were: position, m, yaw, degrees, mass, share.
+        """Return how far off the truth the last look and the last action were: position, m, yaw, degrees, mass, kg.
 
         For scoring only. ``None`` stands for a box that was not found, or not weighed.
         """
-        mass = None if self.weighed is None else self.weighed / self.circumstances.cube_mass - 1
+        mass = None if self.weighed is None else self.weighed - self.circumstances.cube_mass
         if self.box is None:
             return {"position_error": None, "yaw_error": None, "mass_error": mass}
         position, rotation = self.scene.cube_pose()

@@ -85,7 +85,7 @@ def test_boxes_without_tags_are_counted_by_how_well_they_were_found_and_weighed(
     assert (boxes["found"]["count"], boxes["found"]["of"]) == (2, 3)
     assert boxes["position_error_metres"]["mean"] == pytest.approx(0.002)
     assert boxes["yaw_error_degrees"]["max"] == 0.4
-    assert (boxes["weighed"], boxes["mass_error"]) == (2, {"mean": 0.0, "deviation": pytest.approx(0.1)})
+    assert (boxes["weighed"], boxes["mass_error_kilograms"]) == (2, {"mean": 0.0, "deviation": pytest.approx(0.1)})
     assert json.loads(json.dumps(summary, allow_nan=False)) == summary
 
 

@@ -52,7 +52,7 @@ def poses(n, seed=0):
 
 
 def test_without_noise_poses_are_right_to_a_millimetre():
-    for centre, yaw in poses(24):
+    for centre, yaw in poses(12):
         position, angle = errors(found_in(depth_image(centre, yaw)), centre, yaw)
         assert position.max() < 0.002
         assert angle < 0.25
@@ -60,7 +60,7 @@ def test_without_noise_poses_are_right_to_a_millimetre():
 
 def test_with_the_noise_of_a_depth_camera_they_are_right_to_millimetres():
     rng, of_position, of_angle, of_size = np.random.default_rng(1), [], [], []
-    for centre, yaw in poses(48, seed=1):
+    for centre, yaw in poses(24, seed=1):
         found = found_in(noisy_depth(depth_image(centre, yaw), CAMERA.intrinsics[0, 0], 1.0, rng))
         position, angle = errors(found, centre, yaw)
         of_position.append(position)
@@ -76,7 +76,7 @@ def test_with_the_noise_of_a_depth_camera_they_are_right_to_millimetres():
 @pytest.mark.parametrize("size", list(itertools.permutations((0.12, 0.20, 0.28))))
 def test_the_size_of_a_box_is_told_whatever_it_is(size):
     centre = np.array([0.42, 0.01, TABLE + size[2] / 2])
-    for yaw in np.radians((-40.0, -10.0, 0.0, 25.0)):
+    for yaw in np.radians((-40.0, 0.0, 25.0)):
         found = found_in(depth_image(centre, yaw, size))
         np.testing.assert_allclose(found.size, size, atol=0.004)
         np.testing.assert_allclose(found.centre, centre, atol=0.002)
