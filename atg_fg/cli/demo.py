@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -11,28 +10,20 @@ import numpy as np
 import typer
 
 from atg_fg.cli import options
+from atg_fg.cli.beforehand import N_REMEMBERED, PICTURE_BOXES, told_world, world_with_memory
 from atg_fg.cli.story import Story
-from atg_fg.core.assumptions import arcube_assumptions
 from atg_fg.core.memory import RobotMemory
-from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.records import TrialRecord, TrialStep
 from atg_fg.display import figures, trial_plots
 from atg_fg.display.frames import FrameFolder, has_camera
 from atg_fg.engines import begin_trial, engine_for
-from atg_fg.experiments.exploration import explore, learned_memory
 from atg_fg.experiments.trial import learn_from, run_trial
-from atg_fg.learning.structured_memory import memory_for
-from atg_fg.policies import EntropyPolicy, RandomPolicy
+from atg_fg.policies import EntropyPolicy
 from atg_fg.storage import memory_files, plain_files
 from atg_fg.storage.presets import preset as preset_named
 from atg_fg.storage.trial_record import to_json_lines
-from atg_fg.worlds.arcube import Cube, make_arcubes
 from atg_fg.worlds.base import World
-from atg_fg.worlds.registry import assumptions_of, check_arcube_world, make_world, sense_of
 
-N_REMEMBERED = 6
-#: Boxes without tags, before the robot and before a rendered camera, where the robot learns what it remembers.
-PICTURE_BOXES, RENDERED_BOXES = "robonaut-picture-box", "picture-box"
 #: Options of the worlds that have a camera: its last frame is saved, or a film of the trial.
 CAMERAS: Final[dict[str, dict[str, Any]]] = {
     "rendered": {"render_mode": "detections", "image_size": (640, 480)},
@@ -62,10 +53,7 @@ def demo(
 
     Example: atg-fg demo --seed 1 --novel
     """
-    if world == RENDERED_BOXES:
-        world = PICTURE_BOXES
-    if world != PICTURE_BOXES:
-        check_arcube_world("--world", world)
+    world = told_world(world)
     options.check_json_option(json_file)
     parameters = preset_named(preset)
     engine = options.engine_of(engine, parameters, "gtsam")
@@ -76,19 +64,10 @@ def demo(
     engine_for(engine, parameters)
     world_options = {**CAMERAS.get(world, {}), **options.world_options(condition=condition, urdf=urdf)}
     # The last object is the one the robot never meets while it learns.
-    cubes = make_arcubes(N_REMEMBERED + 1, seed)
-    own: dict[str, Any] = {"n_objects": len(cubes), "objects_seed": seed}
-    with closing(
-        make_world(world, **(own if world == PICTURE_BOXES else {"cubes": cubes}), **world_options)
-    ) as made_world:
+    made_world, memory = world_with_memory(world, parameters, seed, np.random.default_rng(learn_seed), **world_options)
+    with closing(made_world):
         things = "boxes" if world == PICTURE_BOXES else "cubes"
         console.print(f"The robot remembers {N_REMEMBERED} {things} that it turned over before.")
-        rng = np.random.default_rng(learn_seed)
-        if world == PICTURE_BOXES:
-            with closing(make_world(RENDERED_BOXES, **own)) as rendered:
-                memory = learn_boxes_beforehand(rendered, parameters, rng)
-        else:
-            memory = learn_beforehand(cubes, parameters, rng)
         rng = np.random.default_rng(trial_seed)
         presented = N_REMEMBERED if novel else int(rng.integers(N_REMEMBERED))
         story = Story(console, memory)
@@ -124,23 +103,6 @@ def demo(
         "truth": truth,
     }
     options.write_json({**document, "saved": saved}, json_file)
-
-
-def learn_boxes_beforehand(world: World, parameters: ModelParameters, rng: np.random.Generator) -> RobotMemory:
-    """Return the memory of a robot that turned each of the first six boxes of a world over at random, twelve times."""
-    empty = RobotMemory(assumptions_of(world, N_REMEMBERED + 1), sense=sense_of(world))
-    memory = memory_for(parameters, empty)
-    explore(memory, world, N_REMEMBERED, RandomPolicy(), 12, rng)
-    return memory
-
-
-def learn_beforehand(cubes: Sequence[Cube], parameters: ModelParameters, rng: np.random.Generator) -> RobotMemory:
-    """Return the memory of a robot that turned each of the first six cubes over at random, twelve times.
-
-    It did so in the ideal world, and knew that each was new.
-    """
-    assumptions, remembered = arcube_assumptions(), cubes[:N_REMEMBERED]
-    return learned_memory(assumptions, remembered, RandomPolicy(), 12, rng, parameters=parameters)
 
 
 def _save(folder: Path, world: World, record: TrialRecord, memory: RobotMemory, lines: str) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 import typer
 
 from atg_fg.cli import options
-from atg_fg.cli.demo import N_REMEMBERED, learn_beforehand
+from atg_fg.cli.beforehand import N_REMEMBERED, told_world, world_with_memory
 from atg_fg.cli.story import Story
 from atg_fg.cli.terminal import say
 from atg_fg.core.records import TrialStep
@@ -19,12 +19,10 @@ from atg_fg.engines import begin_trial, engine_for
 from atg_fg.experiments.trial import run_trial
 from atg_fg.policies import make_policy
 from atg_fg.storage.presets import preset as preset_named
-from atg_fg.worlds.arcube import make_arcubes
-from atg_fg.worlds.registry import check_arcube_world, make_world
 
 
 def watch(
-    world: options.ARcubeWorld = "robonaut",
+    world: options.DemoWorld = "robonaut",
     engine: options.PresetsEngine = None,
     preset: options.Preset = "default",
     policy: options.Policy = "entropy",
@@ -40,11 +38,12 @@ def watch(
 ) -> None:
     """Watch the robot recognise one of six objects it remembers: the scene in 3D, belief and entropy.
 
-    The memory is learned beforehand, from the same objects turned at random in the ideal world.
+    The memory is learned beforehand, from the same objects turned at random in the ideal world, or before a rendered
+    camera if they are boxes without tags.
 
     Example: atg-fg watch --world robonaut --save trial.rrd
     """
-    check_arcube_world("--world", world)
+    world = told_world(world)
     import_rerun()  # fails now rather than after the memory is learned, if it is not installed
     if save is not None:
         check_path(save)
@@ -52,10 +51,15 @@ def watch(
     engine = options.engine_of(engine, parameters, "bayes-filter")
     engine_for(engine, parameters)
     chosen_policy = make_policy(policy)
-    cubes = make_arcubes(N_REMEMBERED + 1, seed)
     learn_seed, trial_seed = np.random.SeedSequence(seed).spawn(2)
-    memory = learn_beforehand(cubes, parameters, np.random.default_rng(learn_seed))
-    with closing(make_world(world, cubes=cubes, **options.world_options(condition=condition, urdf=urdf))) as made_world:
+    made_world, memory = world_with_memory(
+        world,
+        parameters,
+        seed,
+        np.random.default_rng(learn_seed),
+        **options.world_options(condition=condition, urdf=urdf),
+    )
+    with closing(made_world):
         viewer = TrialViewer(made_world, memory, save)
         story = Story(options.console(), memory)
         rng = np.random.default_rng(trial_seed)

@@ -9,7 +9,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from atg_fg.cli.demo import learn_beforehand
+from atg_fg.cli.beforehand import learn_beforehand
 from atg_fg.display.rerun_viewer import TrialViewer
 from atg_fg.engines import begin_trial
 from atg_fg.experiments.trial import run_trial
@@ -57,6 +57,17 @@ def test_a_recording_of_the_robot_holds_robot_cube_camera_belief_and_entropy(run
     # The action takes some simulated seconds, in which poses are logged ten times a second.
     assert rows["/world/cube_0"] > 20
     assert rows["/belief/unseen"] == 2
+
+
+@pytest.mark.slow
+@needs_rerun
+def test_a_box_with_pictures_is_watched_as_a_cube_is(run, tmp_path):
+    pytest.importorskip("pybullet")
+    path = tmp_path / "trial.rrd"
+    status, output, error = run("watch", "--world", "picture-box", "--actions", "1", "--save", path)
+    assert (status, error) == (0, "")
+    assert "verified without error" in said("verify", path)
+    assert {"/world/camera", "/world/cube_0/face_5", "/belief/bars"} <= set(rows_of(path))
 
 
 @needs_rerun
