@@ -2,23 +2,28 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, Final
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.object_sense import ObjectSense
 from atg_fg.core.patterns import FloatArray
 from atg_fg.senses.face_features import rectified
 from atg_fg.senses.tag_drawing import SLOT_COLOURS
 from atg_fg.worlds.arcube import FRONT, TOP, Cube
 from sim.bodies.cube import CUBE_SIZE, face_corners
+from sim.bodies.pictures import TYPICAL_WEIGHT, WEIGHT_SPREAD
 from sim.bodies.tables import WOOD
 from sim.manipulation.weighing import Scales, TorqueSensors
 from sim.vision.box_pose import turned
 from sim.vision.camera import Light
 from sim.vision.cube_pose import CubePose
 from sim.vision.cuboid_fit import Cuboid, find_tabletop, points_of
+from sim.worlds.domain_randomization import Circumstances
 from sim.worlds.picture_box_world import BoxesWithPictures, beside
 from sim.worlds.robonaut_world import RobonautWorld
 
@@ -26,8 +31,12 @@ from sim.worlds.robonaut_world import RobonautWorld
 _SIZE_TOLERANCE: Final = 0.03
 #: What the table's colours sum up to in usual light, grey levels.
 _USUAL_TABLE: Final = 255 * sum(WOOD[:3]) * Light().on_top
+#: Errors of torques do not grow with the weight. Their size is measured: docs/simulation.md.
+_WEIGHT: Final = ObjectSense(
+    "weight", TYPICAL_WEIGHT, TYPICAL_WEIGHT * WEIGHT_SPREAD, 0.035, unit="kg", relative=False, revealed_by=("flip",)
+)
 #: What a snapshot of this world has more than others.
-_KEPT: Final = ("depth", "box", "crops", "seen", "weighed", "_feeling")
+_KEPT: Final = ("depth", "box", "crops", "seen", "weighed", "felt", "_feeling")
 
 
 class RobonautPictureBoxWorld(RobonautWorld, BoxesWithPictures):
@@ -39,6 +48,7 @@ class RobonautPictureBoxWorld(RobonautWorld, BoxesWithPictures):
     Args:
         n_objects: As for ``BoxesWithPictures``.
         objects_seed: As for ``BoxesWithPictures``.
+        weight: Whether each box has a weight of its own, not that of the condition, and a flip lets it be felt.
         image_size: (width, height) of the camera's frame, pixels.
         options: As for ``RobonautWorld`` and ``BoxesWithPictures``.
 
@@ -51,12 +61,21 @@ class RobonautPictureBoxWorld(RobonautWorld, BoxesWithPictures):
     field_of_view = 50.0  # wide enough for a box that is being turned
 
     def __init__(
-        self, n_objects: int = 100, objects_seed: int = 0, *, image_size: tuple[int, int] = (400, 300), **options: Any
+        self,
+        n_objects: int = 100,
+        objects_seed: int = 0,
+        *,
+        weight: bool = False,
+        image_size: tuple[int, int] = (400, 300),
+        **options: Any,
     ) -> None:
+        if not isinstance(weight, bool):
+            raise InvalidInputError(f"weight: {weight!r}; expected true or false")
         self.depth: NDArray[np.float32] = np.zeros(image_size[::-1], dtype=np.float32)
         self.box: Cuboid | None = None
         self.weighed: float | None = None
-        super().__init__(n_objects, objects_seed, image_size=image_size, **options)
+        senses = (_WEIGHT,) if weight else ()
+        super().__init__(n_objects, objects_seed, image_size=image_size, object_senses=senses, **options)
 
     def camera_picture(self) -> NDArray[np.uint8]:
         """Return the last frame with the faces outlined that were found, and what was cut out beside it."""
@@ -85,16 +104,21 @@ class RobonautPictureBoxWorld(RobonautWorld, BoxesWithPictures):
 
     def _place(self) -> None:
         super()._place()
-        self.weighed = None
+        self.weighed, self.felt = None, {}
         # Of its own, so that what is felt changes nothing of what is seen.
         self._feeling = np.random.default_rng(self.np_random.integers(2**63))
         self.scales = Scales(self.scene.robot, TorqueSensors.drawn(self._feeling))
+
+    def _circumstances(self) -> Circumstances:
+        drawn = super()._circumstances()
+        return replace(drawn, cube_mass=float(self.boxes.weights[self.object])) if self.object_senses else drawn
 
     def _try(self, action: str) -> bool:
         self.scales.clear()
         self.controller.on_motion = self._feel if action == "flip" else None
         reachable = super()._try(action)
         self.weighed = self.scales.mass()
+        self.felt = {} if self.weighed is None else {_WEIGHT.name: self.weighed}
         return reachable
 
     def _feel(self, angles: FloatArray, velocities: FloatArray, torques: FloatArray) -> None:

@@ -226,7 +226,7 @@ class RobonautWorld(FiniteStateWorld):
     def _place(self) -> None:
         """Begin a trial: draw its circumstances and stand the cube on the table."""
         self.scene.close()
-        self.circumstances = self.condition.draw(self.np_random)
+        self.circumstances = self._circumstances()
         self.lost, self._seen_at, self._outcome = False, -1, {}
         self._build()
         self.controller.hold(_SETTLING)
@@ -235,6 +235,10 @@ class RobonautWorld(FiniteStateWorld):
             self._film.begin(self.scene, self.camera_picture, self._observer)
         if self._viewer is not None:
             self._viewer.begin(self.scene, [cube.symbols for cube in self._placed_cubes()], self._pictures())
+
+    def _circumstances(self) -> Circumstances:
+        """Draw the circumstances of a trial."""
+        return self.condition.draw(self.np_random)
 
     def _build(self) -> None:
         """Make the scene anew, and the robot's control of it."""

@@ -64,7 +64,7 @@ def test_a_recording_of_the_robot_holds_robot_cube_camera_belief_and_entropy(run
 def test_a_box_with_pictures_is_watched_as_a_cube_is(run, tmp_path):
     pytest.importorskip("pybullet")
     path = tmp_path / "trial.rrd"
-    status, output, error = run("watch", "--world", "picture-box", "--actions", "1", "--save", path)
+    status, _, error = run("watch", "--world", "picture-box", "--actions", "1", "--save", path)
     assert (status, error) == (0, "")
     assert "verified without error" in said("verify", path)
     assert {"/world/camera", "/world/cube_0/face_5", "/belief/bars"} <= set(rows_of(path))

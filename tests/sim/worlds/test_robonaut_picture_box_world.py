@@ -132,6 +132,21 @@ def test_a_flip_weighs_the_box_and_other_actions_do_not(make):
         assert world.weighed is None
 
 
+def test_the_weight_of_a_box_is_felt_after_a_flip_where_it_is_asked_for(make):
+    world = make(weight=True)
+    (sense,) = world.assumptions.object_senses
+    assert (sense.name, sense.unit, sense.revealed_by) == ("weight", "kg", ("flip",))
+    observation, info = world.reset(seed=2)
+    assert info["mass"] == world.boxes.weights[info["object"]]
+    assert observation["measured"].tolist() == [0]
+    observation, *_, info = world.step(FLIP)
+    assert world.observation_space.contains(observation)
+    assert observation["measured"].tolist() == [1]
+    assert abs(observation["weight"][0] - info["mass"]) < 4 * sense.error
+    observation, *_ = world.step(LEFT)
+    assert observation["measured"].tolist() == [0]
+
+
 def test_without_depth_nothing_is_seen_and_the_robot_goes_by_where_the_box_should_be(make, monkeypatch):
     world = make()
     nothing = np.zeros((300, 400), dtype=np.float32)
@@ -164,6 +179,7 @@ def test_pictures_show_what_was_found(make):
     ("options", "error", "message"),
     [
         ({"look_alikes": 2.0}, InvalidInputError, "look_alikes: 2.0; expected a probability"),
+        ({"weight": "yes"}, InvalidInputError, "weight: 'yes'; expected true or false"),
         ({"features": "sift"}, InvalidInputError, "features: 'sift'"),
         ({"condition": "broken"}, UnknownNameError, "broken"),
         ({"render_mode": "human"}, UnknownNameError, "human"),
