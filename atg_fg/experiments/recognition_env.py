@@ -172,7 +172,7 @@ class RecognitionEnv(gymnasium.Env[Summary, np.int64]):
     def _end(self, gain: float) -> tuple[Summary, float, bool, bool, dict[str, Any]]:
         """Score the trial, let the memory learn from it, and return the last step of the episode."""
         learned = learn_from(self._record, self.memory) if self.learns else None
-        success = self._score.add(TrialSummary.of(self._record), learned)
+        success = self._score.add(TrialSummary.of(self._record), learned, self.memory)
         self._inference = None
         info = {**self._truth, "record": self._record, "success": success}
         return self._seen, gain if self.reward == "entropy" else float(success), True, False, info

@@ -66,7 +66,7 @@ def recognise(
         record = _recognised(trial, memory, engine, parameters, recording.place)
         found.append(Recognised(trial, record, learn_from(record, memory) if learn else None))
         if scores is not None:
-            found[-1] = found[-1]._replace(right=scores.add(TrialSummary.of(record), found[-1].learned))
+            found[-1] = found[-1]._replace(right=scores.add(TrialSummary.of(record), found[-1].learned, memory))
             scores.mend(memory)
         if on_trial is not None:
             on_trial()

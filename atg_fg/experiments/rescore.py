@@ -35,7 +35,7 @@ def rescore(test: RecordedTest, engine: str, parameters: ModelParameters) -> Tes
     score = Score()
     for recorded in test.trials:
         trial = TrialSummary.of(_judged(recorded, memory, test.assumptions, engine, parameters))
-        score.add(trial, learn_from(trial, memory))
+        score.add(trial, learn_from(trial, memory), memory)
         score.mend(memory)
     return score.result(0)
 

@@ -68,18 +68,28 @@ class Score:
         self._made_from: dict[str, object] = dict(made_from or {})
         self._presented: set[object] = set(self._made_from.values())
 
-    def add(self, trial: TrialSummary, learned: str | None) -> bool:
+    def add(self, trial: TrialSummary, learned: str | None, memory: RobotMemory | None = None) -> bool:
         """Score a trial whose record went to the ATG named ``learned``; return whether it was a success.
 
-        A trial without a verdict is no success, but its object was met.
+        A trial without a verdict is no success, but its object was met. What counts is where the memory puts the trial
+        when it ends: where looks err, ATGs that it turns out to have mixed up are taken apart at that time, and the
+        trial is of an object met before if earlier ones are in its ATG then, of the one that most of these were of.
         """
         self.n_trials += 1
         self.lost += trial.verdict == "lost"
         self.undecided += trial.verdict == "undecided"
         self._actions.append(len(trial.actions))
         seen_before = trial.object in self._presented
-        identified = trial.verdict == ("known" if seen_before else "novel")
-        right_match = trial.matched is not None and self._made_from.get(trial.matched) == trial.object
+        owners = self._mended_owners(memory, 1)
+        if learned is None or owners is None:
+            verdict: str = trial.verdict
+            right_match = trial.matched is not None and self._made_from.get(trial.matched) == trial.object
+        else:
+            earlier = zip(owners[:-1], self._learned_from, strict=True)
+            mates = Counter(presented for owner, (presented, _) in earlier if owner == learned)
+            verdict = "known" if mates else "novel"
+            right_match = bool(mates) and mates.most_common(1)[0][0] == trial.object
+        identified = verdict == ("known" if seen_before else "novel")
         self.identified += identified
         self.judged_known += seen_before and identified
         self.recognised += seen_before and identified and right_match
@@ -100,11 +110,9 @@ class Score:
         if there are as many of others. By its mended verdict a trial is of a new object if it is now the first of its
         ATG, else of that ATG's; it is right as one that was given is.
         """
-        if not isinstance(memory, StructuredMemory) or not memory.reassignments:
+        owners = self._mended_owners(memory, 0)
+        if owners is None or not isinstance(memory, StructuredMemory):
             return
-        owners = memory.learner.owners
-        if len(owners) != len(self._learned_from):
-            return  # trials from before this test are not ours to judge
         by_name: defaultdict[str, Counter[object]] = defaultdict(Counter)
         for name, (presented, _) in zip(owners, self._learned_from, strict=True):
             by_name[name][presented] += 1
@@ -116,6 +124,14 @@ class Score:
             right = self._made_from.get(name) == presented if name in begun else not seen_before
             self.mended += right
             begun.add(name)
+
+    def _mended_owners(self, memory: RobotMemory | None, n_new: int) -> list[str] | None:
+        """Return the ATG of each trial, the new ones too, if any has changed hands and all are of this test."""
+        if not isinstance(memory, StructuredMemory) or not memory.reassignments:
+            return None
+        owners = memory.learner.owners
+        # Trials from before this test are not ours to judge.
+        return owners if len(owners) == len(self._learned_from) + n_new else None
 
     def name_of(self, presented: object) -> str | None:
         """Return the name of the first ATG that was made from an object, ``None`` if there is none."""

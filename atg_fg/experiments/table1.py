@@ -144,7 +144,7 @@ def _learn_and_score(trial: TrialSummary, memory: RobotMemory, plan: TestPlan, s
     """Learn from a trial, score it, and return which earlier trials turned out to be of other objects."""
     before = memory.reassignments if isinstance(memory, StructuredMemory) else ()
     learned = learn_from(trial, memory)
-    score.add(trial, learned)
+    score.add(trial, learned, memory)
     score.mend(memory)
     if plan.merge_duplicates and learned is not None:
         score.add_merges(merge_duplicates(memory, plan.parameters, learned))

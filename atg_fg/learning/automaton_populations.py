@@ -16,9 +16,8 @@ from atg_fg.learning.populations import (
     HOPELESS,
     Conclusion,
     Population,
+    Samples,
     log_mean,
-    objects_by_label,
-    votes_by_name,
 )
 from atg_fg.learning.raw_trials import Recording
 from atg_fg.learning.sampling_task import Structure, Task
@@ -70,7 +69,7 @@ class AutomatonPopulation(Population):
         elif is_milestone(len(names)):
             worst = int(np.argmin([chain.score for chain in self.chains]))
             self.chains[worst] = self._annealed(task, rng)
-        votes, objects = [], []
+        samples: list[Samples] = []
         for chain in self.chains:
             if len(chain.clusters.owner) < len(names):
                 known = len(chain.clusters.owner)
@@ -78,18 +77,12 @@ class AutomatonPopulation(Population):
                 if known == len(names) - 1:
                     predictive.append(chain.log_predictive(task))
                 chain.place(task, np.arange(known, len(names)), rng)
-            own, scores = np.zeros(int(names.max(initial=-1)) + 2), []
-            of_all = np.zeros((len(names), len(own) - 1 + len(names)))
+            samples.append(Samples(chain, names, task))
             for sweep in range(OWN_SWEEPS if self._may_own else AUTOMATON_SWEEPS):
-                moved = chain.sweep(task, rng, automaton=True)
-                own += votes_by_name(chain, moved.last, names, task)
+                votes = chain.sweep(task, rng, automaton=True)
                 if sweep >= OWN_SWEEPS // 2:
-                    scores.append(chain.log_joint(task))
-                    of_all += objects_by_label(chain, moved, names, task)
-            chain.score = float(np.mean(scores))
-            votes.append(own)
-            objects.append(of_all)
-        conclusion = self._conclude(votes, objects, AUTOMATON_TEMPERATURE)
+                    samples[-1].add(votes)
+        conclusion = self._conclude(samples, AUTOMATON_TEMPERATURE)
         best = max(self.chains, key=lambda chain: chain.score)
         self.chains = [chain if chain.score > best.score - HOPELESS else best.copy() for chain in self.chains]
         return conclusion._replace(log_predictive=log_mean(predictive))
@@ -165,15 +158,14 @@ class RivalPopulations(Population):
         shares = np.exp(logarithms - logarithms.max())
         shares /= shares.sum()
         self.chains = [chain for number in alive for chain in self._rivals[number].chains]
-        probabilities = shares @ np.array([each.probabilities for each in conclusions])
-        weights = np.concatenate(
-            [share * each.weights for share, each in zip(shares.tolist(), conclusions, strict=True)]
+        weighed = list(zip(shares.tolist(), conclusions, strict=True))
+        result = Conclusion(
+            shares @ np.array([each.probabilities for each in conclusions]),
+            np.concatenate([share * each.weights for share, each in weighed]),
+            shares @ np.array([each.together for each in conclusions]),
+            np.concatenate([each.partitions for each in conclusions]),
+            np.concatenate([share * each.shares for share, each in weighed]),
         )
-        objects = sum(
-            (share * each.objects for share, each in zip(shares.tolist(), conclusions, strict=True)),
-            0.0 * conclusions[0].objects,
-        )
-        result = Conclusion(probabilities, weights, objects)
         if len(names) >= RIVAL_TRIALS:
             for number in alive:
                 if self._log_evidence[number] < logarithms.max() - RIVAL_BEHIND:

@@ -13,7 +13,7 @@ from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.learning import gibbs_kernels, kernels, look_kernels, object_kernels, slip_kernels
 from atg_fg.learning.kernels import Clusters, TrialArrays
 from atg_fg.learning.raw_trials import Recording
-from atg_fg.learning.sampling_task import Structure, Task, Votes
+from atg_fg.learning.sampling_task import Structure, Task
 from atg_fg.learning.saved_chain import SavedChain
 from atg_fg.learning.shared_structure import SharedStructure
 
@@ -192,14 +192,16 @@ class Chain:
     def place(self, task: Task, numbers: IntArray, rng: np.random.Generator) -> None:
         """Draw object and start of trials that are of no object yet, one after the other."""
         self._learn_again(task)
-        votes = self._moved(task, numbers, 1.0, rng).last
+        votes = self._moved(task, numbers, 1.0, rng)
         # Which objects the last one touches is settled here for all sweeps, so that each of these leaves the
         # distribution of what it moves as it was.
         objects = np.flatnonzero(votes[:-1] > TOUCHED)
         self._touched = np.flatnonzero(np.isin(self.clusters.owner[:-1], objects))
 
-    def sweep(self, task: Task, rng: np.random.Generator, beta: float = 1.0, *, automaton: bool = False) -> Votes:
+    def sweep(self, task: Task, rng: np.random.Generator, beta: float = 1.0, *, automaton: bool = False) -> FloatArray:
         """Move trials once, the last one at the end: all of them, or those that ``ALL_TRIALS`` leaves.
+
+        Returns p(cluster | all other trials) of the last one, *new* last, shape [C + 1].
 
         Args:
             task: What there is to explain.
@@ -217,8 +219,8 @@ class Chain:
         for number in (0, *self.own_automata):
             gibbs_kernels.transition_moves(self.trials(task), self.clusters, number, n_entries, beta, rng)
 
-    def _moved(self, task: Task, order: IntArray, beta: float, rng: np.random.Generator) -> Votes:
-        votes = np.zeros((len(order), len(self.clusters.n_trials) + 1))
+    def _moved(self, task: Task, order: IntArray, beta: float, rng: np.random.Generator) -> FloatArray:
+        votes = np.zeros(len(self.clusters.n_trials) + 1)
         if self.judges:
             looks, each_slot = task.right_looks, self._each_slot(task)
             given = order, self.clusters, task.log_new, self.error, self.wrong, rng, votes
@@ -227,7 +229,7 @@ class Chain:
         else:
             log_own = self._log_own(task)
             gibbs_kernels.sweep(self.trials(task), order, self.clusters, task.log_new, log_own, beta, rng, votes)
-        return Votes(order, votes)
+        return votes
 
     def slip_sweep(self, task: Task, rng: np.random.Generator, *, thorough: bool) -> FloatArray:
         """Move slips, and the last trial by forward filtering; return its p(cluster | all others), *new* last.
@@ -284,24 +286,6 @@ class Chain:
             looks = np.zeros((len(result), n_names))
             np.add.at(looks, (self.clusters.owner[named], names[named]), task.recording.lengths[named])
             result = np.where(looks.any(axis=1), looks.argmax(axis=1), -1)
-        return result
-
-    def labels(self, names: IntArray, task: Task) -> IntArray:
-        """Return which object each cluster is, −1 of one without trials, shape [C].
-
-        That is the number of a name for the largest of the clusters that most of its looks give it; of any other
-        cluster it is that of no name, the number of names and of the cluster's first trial added up.
-        """
-        clusters, objects = self.clusters, self.objects(names, task)
-        n_names, live = int(names.max(initial=-1)) + 1, np.flatnonzero(clusters.n_trials)
-        looks = np.bincount(clusters.owner, task.recording.lengths, len(clusters.n_trials))
-        result = np.full(len(clusters.n_trials), -1)
-        first = np.full(len(result), len(names))
-        np.minimum.at(first, clusters.owner, np.arange(len(names)))
-        result[live] = n_names + first[live]
-        for cluster in live[np.argsort(-looks[live], kind="stable")].tolist():
-            if objects[cluster] >= 0 and objects[cluster] not in result:
-                result[cluster] = objects[cluster]
         return result
 
     def log_odds_of_mistakes(self, task: Task) -> float:

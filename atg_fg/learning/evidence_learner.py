@@ -20,8 +20,8 @@ from atg_fg.learning.saved_chain import SavedChain
 
 #: A structure that takes more labels than this for wrong explains nothing.
 MOST_WRONG: Final = 0.3
-#: A trial is given to another object that it is of with a greater probability than this.
-MENDED: Final = 0.5
+#: A trial is of a new object if that is more probable than this.
+NOVEL: Final = 0.5
 #: Classes of structure that are rivals where there is one slot.
 MOST_RIVALS: Final = 3
 #: Chains of less weight are not followed through a trial.
@@ -30,7 +30,7 @@ LEAST_WEIGHT: Final = 1e-3
 # Compiled code takes longer to load than all else, so it is loaded where it is used.
 if TYPE_CHECKING:
     from atg_fg.learning.chain import Chain
-    from atg_fg.learning.populations import Population
+    from atg_fg.learning.populations import Conclusion, Population
     from atg_fg.learning.sampling_task import Task
 
 
@@ -93,7 +93,7 @@ class _State(NamedTuple):
     weights: FloatArray
     n_trials: int
     log_evidence: float
-    objects: FloatArray
+    partition: IntArray
 
 
 class EvidenceLearner:
@@ -106,7 +106,7 @@ class EvidenceLearner:
     def __init__(self, learner: StructureLearner) -> None:
         self.learner, self.assumptions, self.seed = learner, learner.assumptions, learner.seed
         noise = DetectorNoise.unknown(self.assumptions.alphabet.n_symbols)
-        self._state = _State(None, noise, np.zeros(0), 0, 0.0, np.zeros((0, 0)))
+        self._state = _State(None, noise, np.zeros(0), 0, 0.0, np.zeros(0, dtype=np.int64))
         self._concluded: tuple[RawTrial, _State, Verdict] | None = None
         self._saved: SavedEvidence | None = None
 
@@ -132,7 +132,8 @@ class EvidenceLearner:
             task = self._task(self.learner.trials[: saved.n_trials], saved.noise)
             population.restore(saved.chains, task)
             weights = np.array(saved.weights)
-            self._state = _State(population, saved.noise, weights, saved.n_trials, saved.log_evidence, np.zeros((0, 0)))
+            nothing = np.zeros(0, dtype=np.int64)
+            self._state = _State(population, saved.noise, weights, saved.n_trials, saved.log_evidence, nothing)
         return self._state
 
     def copy(self, learner: StructureLearner) -> EvidenceLearner:
@@ -194,21 +195,12 @@ class EvidenceLearner:
     def objects(self) -> list[int]:
         """Return which trials are of one object: a number each, the same for the same object.
 
-        A trial is of another object than it was taken for where that is more probable than not, averaged over chains
-        and sweeps.
+        The estimate makes few pairs of trials wrong (``partition_estimate``); the last trial is of the object of the
+        one that it is most probably of one object with, or of none before it.
         """
-        state, n_trials = self._current, len(self.learner.trials)
-        names = tuple(dict.fromkeys(self.learner.owners[: n_trials - 1]))
-        # The last trial may have founded an object.
-        stays = [*self._numbers(self.learner.owners[:-1], names).tolist(), -1]
-        if self.learner.owners[-1] in names:
-            stays[-1] = names.index(self.learner.owners[-1])
-        else:
-            stays[-1] = len(names) + n_trials - 1
-        if state.objects.shape != (n_trials, len(names) + n_trials):
-            return stays
-        best = state.objects.argmax(axis=1)
-        result: list[int] = np.where(state.objects.max(axis=1) > MENDED, best, stays).tolist()
+        state, owners = self._current, self.learner.owners
+        known = len(state.partition) == len(owners)
+        result: list[int] = (state.partition if known else self._numbers(owners, tuple(dict.fromkeys(owners)))).tolist()
         return result
 
     def best(self) -> Chain | None:
@@ -251,8 +243,24 @@ class EvidenceLearner:
         conclusion = population.advance(task, numbers, rng)
         noise = population.tally(task, conclusion.weights, state.noise)
         log_evidence = population.log_evidence(task) - self._log_scale(task)
-        learned = _State(population, noise, conclusion.weights, len(trials), log_evidence, conclusion.objects)
+        partition = self._partition(conclusion, numbers)
+        learned = _State(population, noise, conclusion.weights, len(trials), log_evidence, partition)
         return learned, Verdict(names, conclusion.probabilities)
+
+    @staticmethod
+    def _partition(conclusion: Conclusion, numbers: IntArray) -> IntArray:
+        """Return which object each trial is of, the last one as the verdict has it; that is of one with a name."""
+        from atg_fg.learning.partition_estimate import estimated_partition
+
+        before = numbers.copy()
+        new = np.flatnonzero(before < 0)
+        before[new] = np.setdiff1d(np.arange(len(numbers)), before)[: len(new)]
+        partition = estimated_partition(conclusion.partitions, conclusion.shares, before)
+        if len(partition) > 1:
+            is_new = conclusion.probabilities[-1] > NOVEL
+            same = partition[int(conclusion.together.argmax())]
+            partition[-1] = np.setdiff1d(np.arange(len(numbers)), partition[:-1])[0] if is_new else same
+        return partition
 
     def _population(self) -> Population:
         from atg_fg.learning.automaton_populations import AutomatonPopulation, RivalPopulations

@@ -241,6 +241,7 @@ def sweep(
     rng: np.random.Generator,
     votes: FloatArray,
 ) -> None:
-    """Move trials in this order; p(cluster | all others) of each is added to its row of votes, shape [M, C + 1]."""
+    """Move trials in this order; p(cluster | all others) of the last one is added to votes, shape [C + 1]."""
     for position in range(len(order)):
-        trial_move(trials, order[position], clusters, log_new, log_own, beta, rng, votes[position])
+        counted = votes if position + 1 == len(order) else votes[:0]
+        trial_move(trials, order[position], clusters, log_new, log_own, beta, rng, counted)

@@ -140,7 +140,8 @@ def judged_move(
                 looks[trial], length, path, clusters.registers, table, rate, forced, judged[number], rng
             )
             weights[cluster, first] += prior[cluster]
-    count_votes(weights, free, votes)
+    if len(votes) > 0:
+        count_votes(weights, free, votes)
     drawn = draw_by_logarithm(weights.ravel(), 1.0, rng)
     settle(trials, looks, trial, wrong, judged[drawn])
     put_in(trials, trial, clusters, drawn // n_states, drawn % n_states, path)
@@ -161,7 +162,8 @@ def judged_sweep(
 ) -> None:
     """Move trials in this order, as ``sweep`` does."""
     for position in range(len(order)):
-        judged_move(trials, looks, each_slot, order[position], clusters, log_new, rate, wrong, rng, votes[position])
+        counted = votes if position + 1 == len(order) else votes[:0]
+        judged_move(trials, looks, each_slot, order[position], clusters, log_new, rate, wrong, rng, counted)
 
 
 @compiled

@@ -20,7 +20,7 @@ from atg_fg.learning.detector_noise import DetectorNoise
 from atg_fg.learning.milestones import is_milestone
 from atg_fg.learning.raw_trials import Recording
 from atg_fg.learning.register_search import search_registers
-from atg_fg.learning.sampling_task import Structure, Task, Votes
+from atg_fg.learning.sampling_task import Structure, Task
 from atg_fg.learning.saved_chain import SavedChain
 from atg_fg.learning.shared_structure import SharedStructure
 
@@ -40,15 +40,51 @@ class Conclusion(NamedTuple):
     Attributes:
         probabilities: p(the trial is of the object of each name | all trials), *new* last, shape [names + 1].
         weights: Of the chains, in their order; they sum to one.
-        objects: p(each trial is of the object of each name | all other trials), then of an object without a name, by
-            its first trial, shape [N, names + N]; rows of trials that were not moved are all zero.
+        together: p(the trial is of one object with each earlier one | all trials), shape [N − 1].
+        partitions: Object of each trial in samples, each of which has numbers of its own, shape [M, N].
+        shares: Weights of these samples; they sum to one, shape [M].
         log_predictive: ln p(the trial | all others) before it was taken in, up to the scale of its looks.
     """
 
     probabilities: FloatArray
     weights: FloatArray
-    objects: FloatArray
+    together: FloatArray
+    partitions: IntArray
+    shares: FloatArray
     log_predictive: float = 0.0
+
+
+class Samples:
+    """What one chain says in those of its sweeps that count.
+
+    Args:
+        chain: Whose sweeps they are.
+        names: Number of the name of each trial, −1 of the last one, shape [N].
+        task: What the chain is given.
+    """
+
+    def __init__(self, chain: Chain, names: IntArray, task: Task) -> None:
+        self._chain, self._names, self._task = chain, names, task
+        self.by_name, self.together = np.zeros(int(names.max(initial=-1)) + 2), np.zeros(len(names) - 1)
+        self.partitions: list[IntArray] = []
+        self._scores: list[float] = []
+
+    def add(self, votes: FloatArray) -> None:
+        """Take note of the chain as it is now.
+
+        Args:
+            votes: p(cluster | all other trials) of the last trial, *new* last, shape [C + 1].
+        """
+        owner = self._chain.clusters.owner
+        self.by_name += votes_by_name(self._chain, votes, self._names, self._task)
+        self.together += votes[:-1][owner[:-1]]
+        self.partitions.append(owner.copy())
+        self._scores.append(self._chain.log_joint(self._task))
+
+    @property
+    def score(self) -> float:
+        """Mean of ln of the joint probability."""
+        return float(np.mean(self._scores))
 
 
 class Population(ABC):
@@ -101,14 +137,20 @@ class Population(ABC):
         judged = sound if any(chain.judges for chain in self.chains) else None
         return noise.learned(recording.labels, recording.confidences, right, truth, judged)
 
-    def _conclude(self, votes: list[FloatArray], objects: list[FloatArray], temperature: float) -> Conclusion:
+    def _conclude(self, samples: Sequence[Samples], temperature: float) -> Conclusion:
+        for chain, each in zip(self.chains, samples, strict=True):
+            chain.score = each.score
         scores = np.array([chain.score for chain in self.chains])
         weights = np.exp((scores - scores.max()) / temperature)
         weights /= weights.sum()
-        shares = np.array([each / each.sum() for each in votes])
-        total = sum((weight * each for weight, each in zip(weights.tolist(), objects, strict=True)), 0.0 * objects[0])
-        total /= np.maximum(total.sum(axis=1, keepdims=True), np.finfo(float).tiny)
-        return Conclusion(weights @ shares, weights, total)
+        n_samples = len(samples[0].partitions)
+        return Conclusion(
+            weights @ np.array([each.by_name / n_samples for each in samples]),
+            weights,
+            weights @ np.array([each.together / n_samples for each in samples]),
+            np.concatenate([each.partitions for each in samples]),
+            np.repeat(weights / n_samples, n_samples),
+        )
 
 
 def log_mean(logarithms: Sequence[float]) -> float:
@@ -123,20 +165,6 @@ def votes_by_name(chain: Chain, votes: FloatArray, names: IntArray, task: Task) 
     there = objects >= 0
     np.add.at(result, objects[there], votes[:-1][there])
     result[-1] = votes[-1]
-    return result
-
-
-def objects_by_label(chain: Chain, votes: Votes, names: IntArray, task: Task) -> FloatArray:
-    """Return votes of one sweep for the object of each trial, as ``Conclusion.objects`` has them."""
-    labels, n_names = chain.labels(names, task), int(names.max(initial=-1)) + 1
-    result = np.zeros((len(names), n_names + len(names)))
-    there = labels >= 0
-    clusters, trials = chain.clusters, votes.trials
-    for label, share in zip(labels[there].tolist(), votes.shares[:, :-1][:, there].T, strict=True):
-        result[trials, label] += share
-    # A trial that would be the first of an object is that of the cluster where it is alone, or of one still to come.
-    alone = clusters.n_trials[clusters.owner[trials]] == 1
-    result[trials, np.where(alone, labels[clusters.owner[trials]], n_names + trials)] += votes.shares[:, -1]
     return result
 
 
@@ -165,24 +193,19 @@ class RegisterPopulation(Population):
             chain.place(task, np.arange(known, len(names)), rng)
         if is_milestone(len(names)) or not self.chains:
             self._search(task, rng)
-        votes, objects = [], []
+        samples: list[Samples] = []
         for chain in self.chains:
             if not len(chain.clusters.owner):
                 chain.admit(task)
                 chain.place(task, np.arange(len(names)), rng)
-            own, scores = np.zeros(int(names.max(initial=-1)) + 2), []
-            of_all = np.zeros((len(names), len(own) - 1 + len(names)))
+            samples.append(Samples(chain, names, task))
             for sweep in range(MAP_SWEEPS):
-                found = chain.slip_sweep(task, rng, thorough=sweep % 2 == 1)
-                own += votes_by_name(chain, found, names, task)
+                votes = chain.slip_sweep(task, rng, thorough=sweep % 2 == 1)
                 if sweep >= MAP_SWEEPS // 2:
-                    scores.append(chain.log_joint(task))
+                    samples[-1].add(votes)
                 if sweep + 1 < MAP_SWEEPS:
-                    of_all += objects_by_label(chain, chain.sweep(task, rng), names, task)
-            chain.score = float(np.mean(scores))
-            votes.append(own)
-            objects.append(of_all)
-        conclusion = self._conclude(votes, objects, 1.0)
+                    chain.sweep(task, rng)
+        conclusion = self._conclude(samples, 1.0)
         best = max(chain.score for chain in self.chains)
         kept = [number for number, chain in enumerate(self.chains) if chain.score > best - HOPELESS]
         self.chains, self.maps = [self.chains[number] for number in kept], [self.maps[number] for number in kept]

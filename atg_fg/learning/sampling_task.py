@@ -1,4 +1,4 @@
-"""What chains of samples are given, and what one sweep of theirs says."""
+"""What chains of samples are given."""
 
 from __future__ import annotations
 
@@ -24,24 +24,6 @@ class Structure(NamedTuple):
     successors: IntArray
     registers: IntArray
     n_registers: int
-
-
-class Votes(NamedTuple):
-    """What trials were drawn by in one sweep.
-
-    Attributes:
-        trials: That were moved, in their order, shape [M].
-        shares: p(cluster | all other trials) of each, *new* last, shape [M, C + 1].
-    """
-
-    trials: IntArray
-    shares: FloatArray
-
-    @property
-    def last(self) -> FloatArray:
-        """Those of the last trial, which is moved last, shape [C + 1]."""
-        row: FloatArray = self.shares[-1]
-        return row
 
 
 class Task(NamedTuple):

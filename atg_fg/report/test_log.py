@@ -119,7 +119,7 @@ class Retelling:
         notes = told_mistakes(trial, self._assumptions)
         page = TrialPage(title, told_verdict(trial.verdict, trial.matched), truth, None, (), (), notes=notes)
         page = with_graphs(page, looks, self._memory if self.inferred else None, self._assumptions, trial.matched)
-        right = self.score.add(trial, learn_from(trial, self._memory))
+        right = self.score.add(trial, learn_from(trial, self._memory), self._memory)
         return replace(page, right=right if known or self._was_empty else None)
 
     def _with_beliefs(self, looks: list[Look], parameters: ModelParameters, *, by_entropy: bool) -> list[Look]:

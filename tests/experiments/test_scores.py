@@ -56,6 +56,22 @@ def test_a_second_atg_of_one_object_counts_as_one_false_novelty_when_mended():
     assert score.result(0).mended == (3, 4)
 
 
+def test_a_verdict_counts_as_the_atg_that_its_trial_is_put_in_when_it_ends():
+    memory, score = judged([("a", None), ("b", "object-000")])
+    name = memory.learn([0, 1], [0], "object-000")
+    memory.learn_shared(name, [(0,), (1,)], [0])
+    memory.reassign({1: "object-001", 2: "object-001"})  # the second trial of b shows that the first was one, too
+    assert score.add(trial("b", "object-000"), "object-001", memory)
+    name = memory.learn([0, 1], [0], "object-000")
+    memory.learn_shared(name, [(0,), (1,)], [0])
+    memory.reassign({3: "object-002"})  # alone in its ATG, it is taken for a new object
+    assert score.add(trial("c", "object-000"), "object-002", memory)
+    name = memory.learn([0, 1], [0], "object-001")
+    memory.learn_shared(name, [(0,), (1,)], [0])
+    assert not score.add(trial("a", "object-001"), "object-001", memory)
+    assert score.result(0).success == (3, 5)
+
+
 def test_trials_are_given_back_and_atgs_are_as_they_were():
     memory, _ = judged([("a", None), ("a", "object-000"), ("b", None)])
     before = memory.copy()
