@@ -204,12 +204,13 @@ class CsvReader:
         return RecordedTrial(name, tuple(looks), tuple(actions), objects[0] or None)
 
     def _check_step(self, line: int, step: str, number: int, rows: list[tuple[int, list[str]]]) -> None:
-        first = rows[0][1][self.columns.fixed["step"]].strip()
         if not _is_step(step):
             self._fault("no step", line, "step", f"{brief(step)}; expected a whole number")
-        elif _is_step(first) and int(step) != int(first) + number:
-            kind = "missing step" if int(step) > int(first) + number else "steps out of order"
-            self._fault(kind, line, "step", f"{step}; expected {int(first) + number}, one more than before")
+            return
+        before = rows[number - 1][1][self.columns.fixed["step"]].strip() if number else ""
+        if _is_step(before) and int(step) != int(before) + 1:
+            kind = "missing step" if int(step) > int(before) + 1 else "steps out of order"
+            self._fault(kind, line, "step", f"{step}; expected {int(before) + 1}, one more than before")
 
     def _check_action(self, line: int, action: str) -> None:
         if not action:
@@ -233,6 +234,8 @@ class CsvReader:
             known = {name: value for name, value in given.items() if value}
             if known and label:
                 self._fault("label and weights", line, slot, f"{brief(label)} and likelihoods; expected one of them")
+            elif given and not known and not label:
+                self._fault("no probability", line, slot, "all likelihoods are 0; expected one above 0, or nothing")
             weights.append(known if known and not label else None)
         if any(weights):
             return RecordedLook(tuple(labels), tuple(confidences), tuple(weights))

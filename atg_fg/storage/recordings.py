@@ -309,7 +309,7 @@ def trial_document(trial: RecordedTrial) -> dict[str, Any]:
 def oddities(recording: Recording) -> Iterator[Fault]:
     """Yield what no row shows by itself: what is recorded says little, or speaks against what is assumed."""
     trials, everywhere = recording.trials, "all trials"
-    used = Counter(action for trial in trials for action in trial.actions)
+    used = Counter(action for trial in trials for action in trial.actions if action)
     if len(used) == 1:
         yield _odd("one action", everywhere, f"{next(iter(used))!r} alone; expected several actions")
     for action in recording.actions if len(recording.actions) > 1 else ():

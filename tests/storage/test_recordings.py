@@ -223,6 +223,7 @@ PLANTED = {
     "missing step": ("0,1,rotate,b,0.5,o0\n", ""),
     "steps out of order": ("0,2,tip", "0,1,tip"),
     "no probability": ("0,1,rotate,b,0.5", "0,1,rotate,b,7"),
+    "no step": ("0,1,rotate", f"0,{'9' * 5000},rotate"),
     "confidence alone": ("0,1,rotate,b,0.5", "0,1,rotate,,0.5"),
     "trial split": ("1,0,tip", "0,0,tip"),
     "two objects": ("0,1,rotate,b,0.5,o0", "0,1,rotate,b,0.5,o9"),
@@ -243,6 +244,24 @@ def test_the_check_finds_what_was_planted(written, kind):
         text = ODD.replace("2,0,tip", "0,0,tip", 1)
     found = check_recording(written(text), spec)[1]
     assert kind in {fault.kind for fault in found}, found
+
+
+def test_what_is_odd_in_one_row_is_said_once(written):
+    """A gap is no fault of the rows after it, and an action that is not there is none that there is alone."""
+    text = ODD.replace("0,1,rotate,b,0.5,o0\n", "", 1)
+    assert [str(fault) for fault in check_recording(written(text), SPEC)[1]] == [
+        "line 3, column 'step': 2; expected 1, one more than before"
+    ]
+    found = check_recording(written("trial,step,action,label\na,0,,x\na,1,tip,y\na,2,,x\nb,0,tip,x\nb,1,,y\n"))[1]
+    assert [fault.kind for fault in found] == ["no action", "one action"]
+    assert "'tip' alone" in str(found[-1])
+
+
+def test_likelihoods_of_nothing_at_all_are_refused(written):
+    text = "trial,step,action,side=a,side=b\na,0,tip,0.5,0.5\na,1,,0,0\n"
+    with pytest.raises(InvalidInputError, match="line 3, column 'side': all likelihoods are 0; expected one above 0"):
+        read_recording(written(text))
+    assert read_recording(written(text.replace("0,0\n", ",\n"))).trials[0].looks[1].labels == (None,)
 
 
 @pytest.mark.parametrize(
