@@ -20,7 +20,7 @@ from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import MISSING, Evidence, IntArray
 from atg_fg.core.records import Verdict
-from atg_fg.engines import begin_trial, engine_for
+from atg_fg.engines import begin_trial, engine_for, usual_engine
 from atg_fg.experiments.learned_history import learn_history
 from atg_fg.inference.interface import Inference
 from atg_fg.policies import Choice, Policy, make_policy
@@ -71,7 +71,7 @@ class RecognitionAgent:
         memory: The robot memory; only ``learn`` changes it. One that is kept in a database may be used by other
             processes at the same time.
         parameters: α, δ and whether to learn within the trial.
-        engine: Name of the inference engine.
+        engine: Name of the inference engine; if not given, the usual one for the parameters.
         policy: Chooses the actions, or its name; it may end trials where ``next_action`` is asked.
         seed: Of the generators of all trials, from which ties are broken.
 
@@ -88,12 +88,13 @@ class RecognitionAgent:
         memory: RobotMemory,
         parameters: ModelParameters,
         *,
-        engine: str = "bayes-filter",
+        engine: str | None = None,
         policy: str | Policy = "entropy",
         seed: int = 0,
     ) -> None:
-        engine_for(engine, parameters)
-        self.memory, self.parameters, self.engine = memory, parameters, engine
+        self.memory, self.parameters = memory, parameters
+        self.engine = engine or usual_engine(parameters, "bayes-filter")
+        engine_for(self.engine, parameters)
         self.policy: Policy = make_policy(policy) if isinstance(policy, str) else policy
         self._seeds = np.random.SeedSequence(seed)
         self.trials: list[Inference] = []
