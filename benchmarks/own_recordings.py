@@ -34,19 +34,14 @@ LEVELS = ((0.0, 0.0), (0.05, 0.05), (0.2, 0.1))
 
 
 class Count(NamedTuple):
-    """What came of recordings."""
+    """What came of a recording."""
 
-    trials: int = 0
-    given: int = 0
-    mended: int = 0
-    graphs: int = 0
-    recordings: int = 0
-    looks: int = 0
-    seconds: float = 0.0
-
-    def plus(self, other: Count) -> Count:
-        """Return the sum of both."""
-        return Count(*(one + two for one, two in zip(self, other, strict=True)))
+    trials: int
+    given: int
+    mended: int
+    graphs: int
+    looks: int
+    seconds: float
 
 
 def counted(recording: Recording) -> Count:
@@ -57,7 +52,7 @@ def counted(recording: Recording) -> Count:
     recognise(recording, memory, "learned-structure", parameters, learn=True, scores=scores)
     seconds, looks = time.process_time() - start, sum(len(trial.looks) for trial in recording.trials)
     mended = scores.successes if scores.mended is None else scores.mended
-    return Count(scores.n_trials, scores.successes, mended, len(memory), 1, looks, seconds)
+    return Count(scores.n_trials, scores.successes, mended, len(memory), looks, seconds)
 
 
 def simulated(seed: int, wrong: float, missing: float) -> Recording:
@@ -79,23 +74,22 @@ def main() -> None:
     for heading in ("recording", "trials", "given, %", "mended, %", "ATGs", "looks a second"):
         table.add_column(heading, justify="left" if heading == "recording" else "right")
     for file in files:
-        _add(table, Path(file).stem, counted(read_recording(file)))
+        _add(table, Path(file).stem, [counted(read_recording(file))])
     for wrong, missing in () if files else LEVELS:
-        total = Count()
-        for seed in range(first, first + n_seeds):
-            total = total.plus(counted(simulated(seed, wrong, missing)))
-        _add(table, f"{wrong:.0%} wrong, {missing:.0%} missing, seeds {first}-{first + n_seeds - 1}", total)
+        counts = [counted(simulated(seed, wrong, missing)) for seed in range(first, first + n_seeds)]
+        _add(table, f"{wrong:.0%} wrong, {missing:.0%} missing, seeds {first}-{first + n_seeds - 1}", counts)
     Console(highlight=False, width=120).print(table)
 
 
-def _add(table: Table, name: str, count: Count) -> None:
-    shares = (_share(hits, count.trials) for hits in (count.given, count.mended))
+def _add(table: Table, name: str, counts: list[Count]) -> None:
+    n_trials = sum(count.trials for count in counts)
     table.add_row(
         name,
-        str(count.trials),
-        *shares,
-        f"{count.graphs / count.recordings:.1f}",
-        f"{count.looks / count.seconds:.1f}",
+        str(n_trials),
+        _share(sum(count.given for count in counts), n_trials),
+        _share(sum(count.mended for count in counts), n_trials),
+        f"{sum(count.graphs for count in counts) / len(counts):.1f}",
+        f"{sum(count.looks for count in counts) / sum(count.seconds for count in counts):.1f}",
     )
 
 
