@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import copy
+from dataclasses import astuple
 
 from atg_fg.core.patterns import Evidence, FloatArray
 from atg_fg.inference.belief_components import BeliefComponent, components_of
 from atg_fg.inference.chain import build_chain, forward_backward
 from atg_fg.inference.history import History
 from atg_fg.inference.recognition_model import RecognitionModel
+from atg_fg.learning.object_kinds import words_of_noise
+from atg_fg.learning.plain_evidence import PlainNoise
 from atg_fg.learning.plain_filter import PlainFilter
 
 
@@ -26,6 +29,7 @@ class FollowedPlain:
 
     def __init__(self, model: RecognitionModel, log_weights: FloatArray, history: History) -> None:
         self._log_weights, self._history = log_weights, history
+        self.words = words_of_noise(PlainNoise(*astuple(model.parameters)[:2]))
         self.filter = PlainFilter(model, log_weights)
 
     def weighted(self, log_weight: float) -> FollowedPlain:

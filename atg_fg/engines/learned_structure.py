@@ -30,6 +30,7 @@ from atg_fg.inference.recognition_model import COLLECTION, RecognitionModel
 from atg_fg.learning.believed_structure import BelievedStructure
 from atg_fg.learning.completion import pose_graph
 from atg_fg.learning.evidence_learner import BelievedChain
+from atg_fg.learning.object_kinds import PLAIN_WORDS, words_of_structure
 from atg_fg.learning.path_filter import PathFilter
 from atg_fg.learning.pose_belief_tree import Following, StructureBelief
 from atg_fg.learning.pose_chain import pose_chain, pose_patterns
@@ -177,6 +178,14 @@ class LearnedStructure(BayesFilter):
                         wrong[look, slot] = wrong.get((look, slot), 0.0) + share * (1.0 - right)
         return [Mistake(*place, probability) for place, probability in wrong.items() if probability >= least]
 
+    def kind_belief(self) -> dict[str, float]:
+        """Return the probability of each kind that the object may be of, in words, given the trial so far."""
+        plain, *others = (float(belief.sum()) for belief in self._type_beliefs())
+        kinds: dict[str, float] = {}
+        for each, probability in zip(self._followed, others, strict=True):
+            kinds[each.words] = kinds.get(each.words, 0.0) + probability
+        return {**kinds, PLAIN_WORDS: plain}
+
     def _log_joints(self) -> list[FloatArray]:
         """Return ln p(O, type, z_0:t | a_1:t) of being plain, then of following each structure, each of shape [H]."""
         plain = self._log_plain + self._belief.log_identity + self.scaled_log_evidence
@@ -287,6 +296,7 @@ class FollowedStructure:
 
     def __init__(self, believed: BelievedStructure, log_weights: FloatArray, rates: Rates, memory: RobotMemory) -> None:
         self._poses, self._rates, self._alphabet = believed.structure.poses(), rates, memory.assumptions.alphabet
+        self.words = words_of_structure(believed.structure)
         self._log_weights = log_weights
         new = np.zeros((1, *believed.contents.shape[1:]))
         contents = np.concatenate((believed.contents, new))
@@ -367,6 +377,7 @@ class FollowedChain:
         self, chain: BelievedChain, memory: StructuredMemory, log_weight: float, prior: FloatArray | None
     ) -> None:
         self._noise, self._alphabet = memory.evidence.noise, memory.assumptions.alphabet
+        self.words = "one whose looks err"
         beforehand = chain.log_prior
         if prior is not None:
             beforehand = np.where(np.isfinite(beforehand), log_of(prior), -np.inf)

@@ -15,15 +15,14 @@ import numpy as np
 
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import TooLargeError
-from atg_fg.core.patterns import FloatArray
+from atg_fg.core.patterns import MISSING, FloatArray
 from atg_fg.learning.believed_structure import BelievedStructure, UncertainObjects
 from atg_fg.learning.candidate import Candidate
 from atg_fg.learning.kinds import N_PLAIN, UNCERTAIN_KIND, KindSet, choose_kinds, kind_table, share_kinds
 from atg_fg.learning.milestones import is_milestone
 from atg_fg.learning.plain_evidence import USUAL, PlainEvidence, PlainNoise
 from atg_fg.learning.rates import Rates, Tally, estimate_rates
-from atg_fg.learning.raw_trials import RawTrial
-from atg_fg.learning.search import SearchPlan, propose_structures
+from atg_fg.learning.raw_trials import RawTrial, Recording
 from atg_fg.learning.shared_structure import SharedStructure
 from atg_fg.learning.state_merging import merge_states, mode_automata
 
@@ -42,6 +41,11 @@ KEPT_WITHIN: Final = 10.0
 
 #: Proposals of a search that are scored on all trials.
 MAX_PROPOSALS: Final = 4
+
+
+#: Annealing: chains for each number of registers, and probability of a wrong label.
+N_CHAINS: Final = 3
+WRONG_LABEL: Final = 0.01
 
 
 #: States of trials that no structure explains are merged if there are this many, and this share of all, from so many
@@ -64,7 +68,6 @@ class StructureLearner:
     Args:
         assumptions: Actions and alphabet.
         seed: Of the searches.
-        plan: How much is searched at a milestone.
 
     Attributes:
         trials: All raw trials, in their order.
@@ -74,8 +77,8 @@ class StructureLearner:
         n_evaluations: Structures scored in all searches so far.
     """
 
-    def __init__(self, assumptions: Assumptions, seed: int = 0, plan: SearchPlan | None = None) -> None:
-        self.assumptions, self.seed, self.plan = assumptions, seed, plan or SearchPlan()
+    def __init__(self, assumptions: Assumptions, seed: int = 0) -> None:
+        self.assumptions, self.seed = assumptions, seed
         self.trials: list[RawTrial] = []
         self.owners: list[str] = []
         self.rates = Rates()
@@ -98,10 +101,10 @@ class StructureLearner:
         self._append(owner, trial)
         self._select()
         if is_milestone(len(self.trials)):
-            if search and self._is_worth_a_search():
-                self._search()
             if search:
                 self._merge()
+            if search and self._is_worth_a_search():
+                self._search()
             self._estimate_rates()
             self._select()
         self._estimate_noise()
@@ -257,12 +260,27 @@ class StructureLearner:
         return self.gain < SETTLED_GAIN or in_doubt or has_doubled
 
     def _search(self) -> None:
-        """Add what a search proposes to the candidates."""
-        rng = np.random.default_rng((self.seed, len(self.trials)))
-        incumbents = [structure for structure in self.candidates if structure.n_modes == 1]
-        found = propose_structures(self.trials, self.assumptions, rng, plan=self.plan, incumbents=incumbents)
-        self.n_evaluations += found.n_evaluations
-        self._add(found.structures[:MAX_PROPOSALS])
+        """Add what annealing by exact evidence proposes, of trials that do not merge: looks may be wrong or missing."""
+        from atg_fg.learning import kernels, register_search  # they load Numba
+
+        numbers = self._unexplained()
+        if len(numbers) < LEAST_UNEXPLAINED:
+            numbers = list(range(len(self.trials)))
+        alphabet, n_actions = self.assumptions.alphabet, len(self.assumptions.actions)
+        recording = Recording.of([self.trials[number] for number in numbers], alphabet.n_symbols)
+        labels, symbols = recording.labels[..., None], np.arange(alphabet.n_symbols)
+        shown = np.where(labels == symbols, 1.0 - WRONG_LABEL, WRONG_LABEL / (len(symbols) - 1))
+        looks = np.where(labels == MISSING, 1.0, shown)
+        found = register_search.search_registers(
+            kernels.TrialArrays(looks, recording.actions, recording.lengths),
+            np.logaddexp.reduce(self._of_plain()[numbers], axis=1),
+            len(alphabet.slots),
+            n_actions,
+            N_CHAINS,
+            np.random.default_rng((self.seed, len(self.trials))),
+        )
+        self.n_evaluations += register_search.n_scored(len(alphabet.slots), n_actions, N_CHAINS)
+        self._add(found[:MAX_PROPOSALS])
 
     def _merge(self) -> None:
         """Add what trials merge into that no structure at hand explains."""

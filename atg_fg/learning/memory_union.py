@@ -183,7 +183,7 @@ def _united_learner(one: _Part, two: _Part, same: Sequence[str]) -> StructureLea
                 if name is not None:
                     part.number_of[number] = len(taken)
                     taken.append((name, trial))
-    result = StructureLearner(one.memory.assumptions, learners[0].seed, learners[0].plan)
+    result = StructureLearner(one.memory.assumptions, learners[0].seed)
     result.n_evaluations = sum(learner.n_evaluations for learner in learners)
     structures = dict.fromkeys(structure for learner in learners for structure in learner.candidates)
     most = max(learners, key=lambda learner: len(learner.trials))

@@ -109,13 +109,6 @@ class RawTrial:
             if not 0 <= action < len(assumptions.actions):
                 raise InvalidInputError(f"{place}: action {action}; expected 0 to {len(assumptions.actions) - 1}")
 
-    def pieces(self, n_actions: int) -> list[RawTrial]:
-        """Return this trial cut into pieces of at most ``n_actions`` actions; a cut loses the action at it."""
-        return [
-            RawTrial(self.detections[first : first + n_actions + 1], self.actions[first : first + n_actions])
-            for first in range(0, len(self.detections), n_actions + 1)
-        ]
-
 
 class TrialArrays(NamedTuple):
     """N trials side by side, as long as the longest of them.

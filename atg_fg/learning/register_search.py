@@ -32,7 +32,7 @@ def search_registers(
     n_chains: int,
     rng: np.random.Generator,
 ) -> list[SharedStructure]:
-    """Return the best structure of each chain, in canonical form, without repeats.
+    """Return the best structure of each chain, in canonical form, without repeats, best first.
 
     Args:
         trials: As those of fresh objects, at least one.
@@ -46,22 +46,34 @@ def search_registers(
     prior = np.full(n_symbols, 1.0 / n_symbols)
     newest = slice(max(len(plain) - N_TRIALS, 0), None)
     window = TrialArrays(trials.looks[newest], trials.actions[newest], trials.lengths[newest])
-    found: dict[SharedStructure, float] = {}
+    found: list[SharedStructure] = []
     for n_registers in range(n_slots, n_slots + MAX_HIDDEN + 1):
         best, best_sources = -np.inf, np.zeros((0, 0), dtype=np.int64)
         for _ in range(n_chains):
             sources = np.array([rng.permutation(n_registers) for _ in range(n_actions)])
             coldness = np.geomspace(HOTTEST, 1.0, N_SWEEPS)
             score = map_kernels.anneal_maps(window, plain[newest], sources, n_slots, prior, coldness, False, 0.0, rng)
-            found[_structure(n_slots, sources)] = score
+            found.append(_structure(n_slots, sources))
             if score > best:
                 best, best_sources = score, sources
         permutation, other = log_map_priors(n_registers)
         sources, coldness = best_sources.copy(), np.geomspace(HOTTEST_COPYING, 1.0, N_COPYING_SWEEPS)
         cost = permutation - other
         map_kernels.anneal_maps(window, plain[newest], sources, n_slots, prior, coldness, True, cost, rng)
-        found.setdefault(_structure(n_slots, sources), 0.0)
-    return list(found)
+        found.append(_structure(n_slots, sources))
+
+    def score_of(structure: SharedStructure) -> float:
+        sources = np.array(structure.sources)
+        evidence = map_kernels.map_log_evidence(window, plain[newest], sources, n_slots, prior)
+        return float(evidence) + structure.log_prior
+
+    return sorted(dict.fromkeys(found), key=score_of, reverse=True)
+
+
+def n_scored(n_slots: int, n_actions: int, n_chains: int) -> int:
+    """Return how many structures a search scores."""
+    sizes = range(n_slots, n_slots + MAX_HIDDEN + 1)
+    return sum(n_actions * size**2 * (n_chains * N_SWEEPS + 2 * N_COPYING_SWEEPS) for size in sizes)
 
 
 def _structure(n_slots: int, sources: Sequence[Sequence[int]] | np.ndarray) -> SharedStructure:

@@ -294,10 +294,10 @@ class StructuredMemory(RobotMemory):
     def _under(self, assumptions: Assumptions, labels: Relabelling) -> StructuredMemory:
         """Return a memory of the same under another alphabet; what was sampled is sampled again when asked for."""
         plain, known = super()._under(assumptions, labels), self.learner
-        learner = StructureLearner(assumptions, known.seed, known.plan)
+        learner = StructureLearner(assumptions, known.seed)
         learner.n_evaluations = known.n_evaluations
         trials = [trial.relabelled(labels) for trial in known.trials]
-        learner.restore(known.owners, trials, known.candidates, known.rates)
+        learner.restore(known.owners, trials, known.candidates, known.rates, known.noise)
         memory = StructuredMemory(assumptions, plain, learner, plain.merges, plain.sense)
         memory.restore_evidence(None, self._gain, self._reassignments)
         return memory

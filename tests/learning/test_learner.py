@@ -5,10 +5,11 @@ import numpy as np
 import pytest
 
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.learning.learner import N_DRAWS, StructureLearner
+from atg_fg.learning.learner import N_CHAINS, N_DRAWS, StructureLearner
 from atg_fg.learning.milestones import is_milestone
 from atg_fg.learning.plain_evidence import USUAL
 from atg_fg.learning.rates import Rates
+from atg_fg.learning.register_search import n_scored
 from atg_fg.storage.structure_json import read_learner, write_learner
 from atg_fg.worlds.families import hexagonal_prisms
 from tests.learning.worlds import (
@@ -52,7 +53,7 @@ def test_where_there_is_no_structure_none_is_believed_and_the_search_is_bounded(
     weights = [each.weight for each in learner.believed([])]
     assert sum(weights) < 0.02
     milestones = sum(is_milestone(n) for n in range(1, 16))
-    annealed, merged = milestones * 14_700, (milestones - 5) * (N_DRAWS[0] + 35 * N_DRAWS[1])
+    annealed, merged = milestones * n_scored(2, 3, N_CHAINS), (milestones - 5) * (N_DRAWS[0] + 35 * N_DRAWS[1])
     assert learner.n_evaluations == annealed + merged
 
 
