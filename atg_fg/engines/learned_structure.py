@@ -16,25 +16,22 @@ import numpy as np
 from atg_fg.core.actions import AnyAction, UncertainAction
 from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.log_math import log_of, log_sum_exp
-from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, FloatArray
 from atg_fg.core.records import Mistake
 from atg_fg.engines.bayes_filter import BayesFilter
 from atg_fg.engines.followed_plain import FollowedPlain
+from atg_fg.engines.followed_structure import FollowedStructure
 from atg_fg.inference.belief_components import LEAST_PROBABILITY, BeliefComponent, components_of, shown_patterns_of
 from atg_fg.inference.belief_tree import BeliefNode
-from atg_fg.inference.chain import forward_backward
 from atg_fg.inference.interface import TrialSetup
 from atg_fg.inference.recognition_model import COLLECTION, RecognitionModel
 from atg_fg.learning.believed_structure import BelievedStructure
 from atg_fg.learning.completion import pose_graph
 from atg_fg.learning.evidence_learner import BelievedChain
-from atg_fg.learning.object_kinds import PLAIN_WORDS, words_of_structure
+from atg_fg.learning.object_kinds import PLAIN_WORDS
 from atg_fg.learning.path_filter import PathFilter
 from atg_fg.learning.pose_belief_tree import Following, StructureBelief
-from atg_fg.learning.pose_chain import pose_chain, pose_patterns
-from atg_fg.learning.pose_filter import PoseFilter
 from atg_fg.learning.rates import Rates
 from atg_fg.learning.raw_trials import RawTrial
 from atg_fg.learning.shared_structure import Poses
@@ -279,85 +276,6 @@ class LearnedStructure(BayesFilter):
                 states[states >= len(aspects)] = COLLECTION  # not known yet at that time
                 aspects += weight / sum(weights) * np.bincount(states, shown, len(aspects))
         return mixed
-
-
-class FollowedStructure:
-    """One believed structure in a trial.
-
-    Args:
-        believed: The structure, and what it says of the remembered objects.
-        log_weights: ln p(O, the object follows it), shape [H].
-        rates: Those in force.
-        memory: For its assumptions.
-
-    Attributes:
-        filter: Over the pose and contents of each object and of *unseen*.
-    """
-
-    def __init__(self, believed: BelievedStructure, log_weights: FloatArray, rates: Rates, memory: RobotMemory) -> None:
-        self._poses, self._rates, self._alphabet = believed.structure.poses(), rates, memory.assumptions.alphabet
-        self.words = words_of_structure(believed.structure)
-        self._log_weights = log_weights
-        new = np.zeros((1, *believed.contents.shape[1:]))
-        contents = np.concatenate((believed.contents, new))
-        self.filter = PoseFilter(self._poses, contents, rates, self._alphabet, log_weights)
-
-    def weighted(self, log_weight: float) -> FollowedStructure:
-        """Return the same structure, a factor less probable."""
-        twin = copy.copy(self)
-        twin._log_weights = self._log_weights + log_weight
-        return twin
-
-    def weigh(self, log_likelihood: FloatArray) -> None:
-        """Take in what was felt of the object as a whole: ln p(reading | O), shape [H]."""
-        self._log_weights = self.filter.log_weights = self._log_weights + log_likelihood
-
-    @property
-    def log_joint(self) -> FloatArray:
-        """Ln p(O, the object follows this structure, z_0:t | a_1:t), shape [H]."""
-        return self._log_weights + self.filter.log_evidence
-
-    def components(self, belief: FloatArray) -> list[BeliefComponent]:
-        """Return the component of each probable object, with its poses as aspects.
-
-        Args:
-            belief: p(O, the object follows this structure | z_0:t, a_1:t), shape [H].
-        """
-        components = []
-        for hypothesis in np.flatnonzero(belief >= LEAST_PROBABILITY).tolist():
-            contents = self.filter.learned_contents(hypothesis)
-            if contents is not None:
-                graph = pose_graph(self._poses, contents, self._rates, self._alphabet)
-                poses = self.filter.poses_of(hypothesis)
-                components.append(BeliefComponent(hypothesis, float(belief[hypothesis]), graph, poses))
-        return components
-
-    def observe(self, evidence: Evidence) -> None:
-        """Take in the evidence of a look."""
-        if evidence.pattern is None:
-            self.filter.observe_likelihood(evidence.likelihood)
-        else:
-            self.filter.observe_pattern(self._alphabet.symbols[evidence.pattern])
-
-    def smoothed_patterns(self, hypothesis: int, inference: LearnedStructure) -> list[FloatArray]:
-        """Return p(pattern shown at time s | O = hypothesis, all evidence) of every time s, each of shape [|𝒵|].
-
-        The contents are those that the trial has left, taken as known.
-        """
-        learned = self.filter.learned_contents(hypothesis)
-        if learned is None:
-            return []
-        contents, evidence = learned[None], inference.history.evidence
-        chain = pose_chain(self._poses, contents, np.ones(1), self._rates, self._alphabet, inference.history)
-        shown = pose_patterns(self._poses, contents, self._rates, self._alphabet)[0]
-        patterns = []
-        for time, marginal in enumerate(forward_backward(chain)):
-            likelihood = np.ones(len(self._alphabet)) if time >= len(evidence) else evidence[time].likelihood
-            noise = self._rates.wrong / len(self._alphabet) * likelihood.sum()
-            given_pose = shown * ((1.0 - self._rates.wrong) * likelihood + noise)
-            total = given_pose.sum(axis=1)
-            patterns.append((marginal / np.where(total > 0, total, 1.0)) @ given_pose)
-        return patterns
 
 
 class FollowedChain:
