@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atg_fg.core.log_math import log_sum_exp
-from atg_fg.core.patterns import FloatArray, IntArray
+from atg_fg.core.patterns import MISSING, FloatArray, IntArray
 from atg_fg.learning import gibbs_kernels, kernels, look_kernels, object_kernels, slip_kernels
 from atg_fg.learning.kernels import Clusters, TrialArrays
 from atg_fg.learning.raw_trials import Recording
@@ -293,9 +293,11 @@ class Chain:
 
         Accidents of one register seldom show the same wrong label twice in a trial, with probability 1 / (V − 1); where
         the structure is not the right one, the same label comes again whenever the object is turned the same way.
+        Looks that are wrong in all slots are the detector's, whatever they show.
         """
         self._learn_again(task)
-        pairs, same = kernels.recurrences(self.trials(task), self.clusters, task.recording.labels)
+        labels = np.where(self.wrong[..., None], MISSING, task.recording.labels)
+        pairs, same = kernels.recurrences(self.trials(task), self.clusters, labels)
         by_accident = 1.0 / max(task.recording.n_symbols - 1, 2)
         again, other = np.log(RECURRING / by_accident), np.log((1.0 - RECURRING) / (1.0 - by_accident))
         return float(same * again + (pairs - same) * other)

@@ -98,13 +98,60 @@ def transition_moves(
     successors = clusters.successors[automaton]
     n_actions, n_states = successors.shape[0] - 1, successors.shape[1]
     path, scores = np.empty(trials.looks.shape[1], np.int64), np.empty(n_states)
+    passing, others = np.empty(len(trials.lengths), np.int64), np.empty_like(clusters.tables)
     for entry in rng.permutation(n_actions * n_states)[:n_entries]:
         action, state = entry // n_states, entry % n_states
+        # Only the trials that pass this entry say anything of it; what the others say of their objects stays.
+        n_passing = learn_from_others(trials, clusters, automaton, action, state, path, passing)
+        for position in range(n_passing):
+            cluster = clusters.owner[passing[position]]
+            others[cluster] = clusters.tables[cluster]
         for successor in range(n_states):
             successors[action, state] = successor
-            scores[successor] = learn_all_again(trials, clusters, automaton, path)
+            scores[successor] = 0.0
+            for position in range(n_passing):
+                cluster = clusters.owner[passing[position]]
+                clusters.tables[cluster] = others[cluster]
+            for position in range(n_passing):
+                trial = passing[position]
+                scores[successor] += take_in(trials, trial, clusters, clusters.owner[trial], path)
         successors[action, state] = draw_by_logarithm(scores, beta, rng)
     learn_all_again(trials, clusters, automaton, path)
+
+
+@compiled
+def learn_from_others(
+    trials: TrialArrays,
+    clusters: Clusters,
+    automaton: int,
+    action: int,
+    state: int,
+    path: IntArray,
+    passing: IntArray,
+) -> int:
+    """Make tables of what follows an automaton anew from the trials in which it does not take an action in a state.
+
+    The trials in which it does are filled in; only tables of their objects are right. Returns how many they are.
+    """
+    successors = clusters.successors[automaton]
+    n_passing = 0
+    for cluster in range(len(clusters.n_trials)):
+        if clusters.n_trials[cluster] > 0 and clusters.automaton[cluster] == automaton:
+            forget(clusters, cluster)
+    for trial in range(len(trials.lengths)):
+        cluster = clusters.owner[trial]
+        if cluster < 0 or clusters.automaton[cluster] != automaton:
+            continue
+        walk(successors, trials.actions[trial], trials.lengths[trial], clusters.start[trial], path)
+        is_passing = False
+        for time in range(trials.lengths[trial] - 1):
+            is_passing = is_passing or (trials.actions[trial, time] == action and path[time] == state)
+        if is_passing:
+            passing[n_passing] = trial
+            n_passing += 1
+        else:
+            take_in(trials, trial, clusters, cluster, path)
+    return n_passing
 
 
 @compiled

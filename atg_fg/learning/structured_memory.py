@@ -132,7 +132,8 @@ class StructuredMemory(RobotMemory):
         felt = tuple(measured) if any(measured) else ()
         trial = RawTrial(tuple(detections), tuple(actions), tuple(confidences), tuple(likelihoods), felt)
         trial.check(self.assumptions)
-        before = self.gain if len(self.learner.trials) >= FIRST_TRIALS else 0.0
+        # Where there is no other model than the one in which looks err, nothing is searched for in vain.
+        before = self.gain if len(self.learner.trials) >= FIRST_TRIALS or np.isinf(self.gain) else 0.0
         self.learner.learn(self[name].name, trial, search=before < OUTDONE)
         # A model that is far behind rests; it looks at all trials again whenever their number has doubled.
         if before > -OUTDONE or len(self.learner.trials).bit_count() == 1:

@@ -336,6 +336,26 @@ def test_errors_that_recur_are_the_structures_and_those_that_do_not_are_the_dete
             chain.sweep(task, rng)
         odds.append(chain.log_odds_of_mistakes(task))
     assert odds[0] < 0 < odds[1]
+    chain.wrong[:] = True  # looks that are wrong in all slots are the detector's, whatever they show
+    assert chain.log_odds_of_mistakes(task) == 0.0
+
+
+def test_an_entry_is_drawn_by_what_the_trials_that_pass_it_say():
+    trials = drawn_trials(np.random.default_rng(19))
+    chain, _ = chain_of(trials, [0, 0, 1, 0], [0, 1, 2, 0])
+    clusters, path = chain.clusters, np.empty(trials.looks.shape[1], dtype=np.int64)
+    passing = np.empty(4, dtype=np.int64)
+    for action, state in itertools.product(range(2), range(3)):
+        says, joint = [], []
+        for successor in range(3):
+            clusters.successors[0, action, state] = successor
+            joint.append(kernels.learn_all_again(trials, clusters, 0, path))
+            n_passing = gibbs_kernels.learn_from_others(trials, clusters, 0, action, state, path, passing)
+            taken = [
+                kernels.take_in(trials, trial, clusters, clusters.owner[trial], path) for trial in passing[:n_passing]
+            ]
+            says.append(sum(taken))
+        assert np.allclose(np.diff(says), np.diff(joint), atol=1e-12)
 
 
 def test_beyond_two_hundred_trials_a_sweep_moves_a_bounded_number(monkeypatch):
