@@ -130,7 +130,7 @@ def main() -> None:
 
 
 def _say_that_loops_are_compiled() -> None:
-    print("atg-fg: compiling loops, which takes some seconds the first time", file=sys.stderr, flush=True)
+    print("atg-fg: compiling loops, which takes up to a minute the first time", file=sys.stderr, flush=True)
 
 
 def _left_by_output(error: OSError | SystemExit) -> int:

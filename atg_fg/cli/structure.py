@@ -124,9 +124,11 @@ def _document(
     }
 
 
-def _members(kind: UncertainObjects | None, memory: StructuredMemory) -> list[str]:
-    """Return the names of the objects whose actions are probably uncertain."""
-    is_one = [] if kind is None else (kind.members > 0.5).tolist()
+def _members(kind: UncertainObjects | None, memory: StructuredMemory | None) -> list[str]:
+    """Return the names of the objects whose actions are probably uncertain; none where looks err."""
+    if kind is None or memory is None or memory.erring:
+        return []
+    is_one = (kind.members > 0.5).tolist()
     return [name for name, member in zip(memory.names, is_one, strict=False) if member]
 
 

@@ -64,6 +64,9 @@ def test_what_was_learned_unsupervised_recognises_what_comes_next(run, folder):
     assert success["rate"] >= 0.7
     assert "barcode" in (folder / "page.html").read_text()
     assert len(load_memory(folder / "robot.db")) == len(learned["objects"])  # nothing was learned
+    told = run("memory", "structure", "robot.db")[1].splitlines()
+    assert told[0] == "robot.db: no learned structure: looks err, see below"
+    assert told[1].startswith("looks err: ")
 
 
 def test_an_empty_memory_is_begun_and_each_trial_learned_before_the_next(run, folder):
