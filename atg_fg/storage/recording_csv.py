@@ -102,14 +102,15 @@ def columns_of(header: Sequence[str], slots: Sequence[str] | None = None) -> Csv
         owner, equals, label = name.partition("=")
         if equals and owner in weights:
             weights[owner].append((index, label))
-        owner, colon, kind = name.partition(":")
-        if colon and not equals and (kind != _CONFIDENCE or owner not in weights):
-            raise InvalidInputError(
-                f"line 1: column {brief(name)}; expected SLOT:confidence of a slot: {listed(owned)}"
-            )
     for slot in owned:
         if slot not in number and not weights[slot]:
             raise InvalidInputError(f"line 1: no column for slot {slot!r} in {listed(names)}; expected one")
+    for name in names:
+        owner, colon, kind = name.partition(":")
+        if colon and "=" not in name and (kind != _CONFIDENCE or owner not in weights):
+            raise InvalidInputError(
+                f"line 1: column {brief(name)}; expected SLOT:confidence of a slot: {listed(owned)}"
+            )
     alone = number.get(_CONFIDENCE) if len(owned) == 1 and _CONFIDENCE not in owned else None
     return CsvColumns(
         tuple(owned),
