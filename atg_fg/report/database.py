@@ -16,6 +16,7 @@ from atg_fg.core.memory import RobotMemory
 from atg_fg.core.records import Experiment, TrialSummary
 from atg_fg.report.content import Report, TrialPage, shown_parameters
 from atg_fg.report.graphs import TrialGraphs, gallery
+from atg_fg.report.kinds import told_kind, told_kinds
 from atg_fg.report.summaries import looks_of, told_truth, told_verdict
 from atg_fg.report.test_log import Retelling, test_report
 from atg_fg.storage.database.memory_reading import database_holds_memory
@@ -110,7 +111,7 @@ class _Taught:
         kind = "trial" if experiment is None else experiment.kind
         parameters = {} if experiment is None else {"seed": experiment.seed, **about}
         title = f"{kind}, {len(pages)} of them" if len(pages) > 1 else f"A {kind}, look by look"
-        notes = () if self._retelling is not None and self._retelling.inferred else (_NOTE,)
+        notes = () if self._retelling is not None and self._retelling.inferred else (_NOTE, *told_kinds(self._memory))
         return Report(title, shown_parameters(parameters), notes, assumptions, tuple(pages))
 
     def _page(self, trial: TrialSummary, about: Mapping[str, Any], assumptions: Assumptions) -> TrialPage:
@@ -141,6 +142,7 @@ class _Taught:
             right=None,
             looks=tuple(replace(look, graph=index) for look in looks_of(trial, n_unseen)),
             graphs=graphs.graphs,
+            notes=told_kind(memory, trial.learned),
         )
 
 

@@ -12,6 +12,7 @@ from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.patterns import Detection, Evidence
 from atg_fg.report.content import PlacedGraph, Report
+from atg_fg.report.kinds import told_kinds
 
 #: ATGs that a gallery shows.
 MOST_DRAWN = 200
@@ -75,7 +76,8 @@ def gallery(memory: RobotMemory, name: str) -> Report:
     if not len(memory):
         raise InvalidInputError(f"{name}: no objects; expected at least one")
     drawn = tuple(_remembered(graph, graph.name, graph) for graph in itertools.islice(memory, MOST_DRAWN))
-    notes = () if len(memory) <= MOST_DRAWN else (f"The first {MOST_DRAWN} of {len(memory)} objects are drawn.",)
+    drawn_alone = (f"The first {MOST_DRAWN} of {len(memory)} objects are drawn.",)
+    notes = (*(() if len(memory) <= MOST_DRAWN else drawn_alone), *told_kinds(memory))
     title = f"{len(memory)} of {memory.assumptions.n_objects} objects"
     return Report(title, {"file": name}, notes, memory.assumptions, gallery=drawn)
 

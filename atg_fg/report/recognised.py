@@ -11,6 +11,7 @@ from atg_fg.core.memory import RobotMemory
 from atg_fg.core.records import TrialSummary
 from atg_fg.experiments.recorded_trials import Recognised
 from atg_fg.report.content import Report, TrialPage
+from atg_fg.report.kinds import told_kinds
 from atg_fg.report.page import write_report
 from atg_fg.report.summaries import look_of, told_mistakes, told_truth, told_verdict, with_graphs
 from atg_fg.report.trial_record import best_objects
@@ -32,7 +33,8 @@ def write_page(found: Sequence[Recognised], memory: RobotMemory, score: Mapping[
     pages = tuple(_page(each, memory) for each in found)
     right = "" if score is None else f", {score['success']['count']} of them right"
     note = "The graph is the ATG that the object is taken for, as it is after the last trial."
-    write_report(Report(f"{len(pages)} trials of a recording{right}", {}, (note,), memory.assumptions, pages), path)
+    notes = (note, *told_kinds(memory))
+    write_report(Report(f"{len(pages)} trials of a recording{right}", {}, notes, memory.assumptions, pages), path)
 
 
 def _page(each: Recognised, memory: RobotMemory) -> TrialPage:

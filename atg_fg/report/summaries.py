@@ -12,6 +12,7 @@ from atg_fg.core.memory import RobotMemory
 from atg_fg.core.records import StepSummary, TrialSummary
 from atg_fg.report.content import Look, TrialPage
 from atg_fg.report.graphs import TrialGraphs
+from atg_fg.report.kinds import told_kind
 
 
 def look_of(step: StepSummary, n_unseen: int | None) -> Look:
@@ -86,4 +87,5 @@ def with_graphs(
     for look in looks:
         best = look.objects[0][0] if look.objects else matched
         pointing.append(replace(look, graph=graphs.index_of(None if look.unseen > 0.5 else best)))
-    return replace(page, looks=tuple(pointing), graphs=graphs.graphs)
+    notes = (*page.notes, *told_kind(memory, matched))
+    return replace(page, looks=tuple(pointing), graphs=graphs.graphs, notes=notes)

@@ -15,6 +15,7 @@ from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.records import StepSummary
 from atg_fg.report.content import Look, Named, Report, TrialPage, shown_parameters
+from atg_fg.report.kinds import told_kinds
 from atg_fg.report.pictures import data_address
 from atg_fg.report.summaries import look_of, told_mistakes, told_truth, told_verdict, with_graphs
 from atg_fg.storage.checked_json import check_format, parse_json, read_info, read_list, read_object
@@ -82,7 +83,7 @@ def read_trial_record(text: str, path: Path, memory: RobotMemory | None) -> Repo
         notes=told_mistakes(trial, assumptions),
     )
     page = with_graphs(page, [look for _, look in looks], memory, assumptions, trial.matched)
-    notes = () if memory is not None or not names else (_NO_MEMORY,)
+    notes = told_kinds(memory) if memory is not None or not names else (_NO_MEMORY,)
     parameters = shown_parameters({key: value for key, value in header.items() if key not in _OWN})
     return Report("A trial, look by look", parameters, notes, assumptions, (page,))
 
