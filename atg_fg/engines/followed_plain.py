@@ -5,9 +5,9 @@ from __future__ import annotations
 import copy
 from dataclasses import astuple
 
-from atg_fg.core.patterns import Evidence, FloatArray
+from atg_fg.core.patterns import Evidence, FloatArray, IntArray
 from atg_fg.inference.belief_components import BeliefComponent, components_of
-from atg_fg.inference.chain import build_chain, forward_backward
+from atg_fg.inference.chain import Chain, build_chain, forward_backward
 from atg_fg.inference.history import History
 from atg_fg.inference.recognition_model import RecognitionModel
 from atg_fg.learning.object_kinds import words_of_noise
@@ -60,7 +60,11 @@ class FollowedPlain:
         """
         return components_of(self.filter.model, belief[:, None] * self.filter.aspects)
 
+    def chain(self, hypothesis: int, history: History) -> tuple[Chain, IntArray]:
+        """Return the trial under one object, and the pattern of each of its states, −1 of the collection node."""
+        model = self.filter.model
+        return build_chain(model.memory, model.parameters, history, [hypothesis]), model.pattern_of[hypothesis]
+
     def smoothed_aspects(self, hypothesis: int) -> list[FloatArray]:
         """Return p(X_s | O = hypothesis, all evidence) of every time s, each of shape [W_s]."""
-        model = self.filter.model
-        return forward_backward(build_chain(model.memory, model.parameters, self._history, [hypothesis]))
+        return forward_backward(self.chain(hypothesis, self._history)[0])

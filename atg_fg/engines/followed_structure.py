@@ -7,12 +7,13 @@ import copy
 import numpy as np
 
 from atg_fg.core.memory import RobotMemory
-from atg_fg.core.patterns import Evidence, FloatArray
+from atg_fg.core.patterns import Evidence, FloatArray, IntArray
 from atg_fg.inference.belief_components import LEAST_PROBABILITY, BeliefComponent
-from atg_fg.inference.chain import forward_backward
+from atg_fg.inference.chain import Chain, forward_backward
+from atg_fg.inference.history import History
 from atg_fg.inference.interface import Inference
 from atg_fg.learning.believed_structure import BelievedStructure
-from atg_fg.learning.completion import pose_graph
+from atg_fg.learning.completion import most_probable_patterns, pose_graph
 from atg_fg.learning.object_kinds import words_of_structure
 from atg_fg.learning.pose_chain import pose_chain, pose_patterns
 from atg_fg.learning.pose_filter import PoseFilter
@@ -76,6 +77,18 @@ class FollowedStructure:
             self.filter.observe_likelihood(evidence.likelihood)
         else:
             self.filter.observe_pattern(self._alphabet.symbols[evidence.pattern])
+
+    def chain(self, hypothesis: int, history: History) -> tuple[Chain, IntArray] | None:
+        """Return the trial under one object whose aspects are the poses, and the pattern of each pose, −1 if unknown.
+
+        The contents are those that the trial has left, taken as known. ``None`` if the object has been ruled out.
+        """
+        learned = self.filter.learned_contents(hypothesis)
+        if learned is None:
+            return None
+        chain = pose_chain(self._poses, learned[None], np.ones(1), self._rates, self._alphabet, history)
+        certainty, patterns = most_probable_patterns(self._poses, learned, self._rates, self._alphabet)
+        return chain, np.where(certainty > 0.5, patterns, -1)
 
     def smoothed_patterns(self, hypothesis: int, inference: Inference) -> list[FloatArray]:
         """Return p(pattern shown at time s | O = hypothesis, all evidence) of every time s, each of shape [|𝒵|].

@@ -9,7 +9,9 @@ A memory that has learned no structure leaves the Bayes filter alone.
 from __future__ import annotations
 
 import copy
-from typing import ClassVar, Final
+from collections.abc import Callable
+from functools import partial
+from typing import ClassVar, Final, NamedTuple
 
 import numpy as np
 
@@ -17,13 +19,15 @@ from atg_fg.core.actions import AnyAction, UncertainAction
 from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.log_math import log_of, log_sum_exp
 from atg_fg.core.parameters import ModelParameters
-from atg_fg.core.patterns import Evidence, FloatArray
+from atg_fg.core.patterns import Evidence, FloatArray, IntArray
 from atg_fg.core.records import Mistake
 from atg_fg.engines.bayes_filter import BayesFilter
 from atg_fg.engines.followed_plain import FollowedPlain
 from atg_fg.engines.followed_structure import FollowedStructure
 from atg_fg.inference.belief_components import LEAST_PROBABILITY, BeliefComponent, components_of, shown_patterns_of
 from atg_fg.inference.belief_tree import BeliefNode
+from atg_fg.inference.chain import Chain
+from atg_fg.inference.explanations import best_explanations
 from atg_fg.inference.interface import TrialSetup
 from atg_fg.inference.recognition_model import COLLECTION, RecognitionModel
 from atg_fg.learning.believed_structure import BelievedStructure
@@ -41,6 +45,22 @@ from atg_fg.learning.structured_memory import StructuredMemory
 RULED_OUT: Final = 1e-9
 #: If no object is more probable than this to have uncertain actions, none is taken to have.
 NEGLIGIBLE: Final = 2e-3
+
+
+class KindExplanation(NamedTuple):
+    """One way in which all that was seen can have come about.
+
+    Attributes:
+        kind: What kind of thing it is, in words.
+        hypothesis: State of O; the last one is *unseen*.
+        patterns: Index of the pattern that was shown at every look, −1 where it is not known.
+        probability: p(kind, O, X_0:t | z_0:t, a_1:t).
+    """
+
+    kind: str
+    hypothesis: int
+    patterns: tuple[int, ...]
+    probability: float
 
 
 class LearnedStructure(BayesFilter):
@@ -182,6 +202,36 @@ class LearnedStructure(BayesFilter):
         for each, probability in zip(self._followed, others, strict=True):
             kinds[each.words] = kinds.get(each.words, 0.0) + probability
         return {**kinds, PLAIN_WORDS: plain}
+
+    def kind_explanations(self, k: int = 1) -> list[KindExplanation]:
+        """Return the k most probable explanations of the trial by kind, object and aspects, best first.
+
+        Where looks err so often that raw trials are sampled, there is none of that kind.
+        """
+        plain, *others = self._type_beliefs()
+        kinds: list[tuple[str, FloatArray, Callable[[int], tuple[Chain, IntArray] | None]]] = [
+            (PLAIN_WORDS, plain, self._plain_chain)
+        ]
+        kinds += [
+            (each.words, belief, partial(each.chain, history=self.history))
+            for each, belief in zip(self._followed, others, strict=True)
+            if not isinstance(each, FollowedChain)
+        ]
+        found: list[KindExplanation] = []
+        for words, belief, chain_of in kinds:
+            for hypothesis in np.flatnonzero(belief >= LEAST_PROBABILITY).tolist():
+                told = chain_of(hypothesis)
+                if told is None:
+                    continue
+                chain, pattern_of = told
+                for path in best_explanations(chain, k):
+                    patterns = tuple(int(pattern_of[state]) for state in path.states)
+                    probability = float(belief[hypothesis]) * path.probability
+                    found.append(KindExplanation(words, hypothesis, patterns, probability))
+        return sorted(found, key=lambda each: -each.probability)[:k]
+
+    def _plain_chain(self, hypothesis: int) -> tuple[Chain, IntArray] | None:
+        return self.chain(hypothesis), self.model.pattern_of[hypothesis]
 
     def _log_joints(self) -> list[FloatArray]:
         """Return ln p(O, type, z_0:t | a_1:t) of being plain, then of following each structure, each of shape [H]."""
