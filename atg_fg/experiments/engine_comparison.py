@@ -5,7 +5,7 @@ from __future__ import annotations
 import statistics
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -30,8 +30,10 @@ from atg_fg.worlds.arcube import make_arcubes
 from atg_fg.worlds.base import detection_of
 from atg_fg.worlds.registry import make_world
 
-#: The exact engine that the others are held against, and timed against.
+#: The exact engine that the others are held against, and timed against; and the one that knows of kinds, where the
+#: parameters say that these are learned.
 REFERENCE: Final = "bayes-filter"
+REFERENCE_OF_KINDS: Final = "learned-structure"
 
 
 @dataclass(frozen=True)
@@ -66,7 +68,9 @@ class ComparisonPlan:
     def learned_memory(self, rng: np.random.Generator) -> RobotMemory:
         """Return a memory of the first objects, each turned at random in the ideal world."""
         cubes = make_arcubes(self.n_objects, seed=0)[: self.n_remembered]
-        return learned_memory(arcube_assumptions(self.n_objects), cubes, RandomPolicy(), self.n_learning_actions, rng)
+        assumptions = arcube_assumptions(self.n_objects)
+        turned = RandomPolicy(), self.n_learning_actions, rng
+        return learned_memory(assumptions, cubes, *turned, parameters=self.parameters)
 
     def drawn_course(self, memory: RobotMemory, rng: np.random.Generator) -> Course:
         """Return what is seen and done in a trial with random actions."""
@@ -156,6 +160,9 @@ def compare_engines(
 ) -> dict[str, EngineRecord]:
     """Let engines follow trials of one's own, look by look, side by side with the reference, ``bayes-filter``.
 
+    If the parameters say that kinds of objects are learned (preset ``learned``), the reference is
+    ``learned-structure``, and engines that know nothing of kinds take each object for a plain ATG.
+
     Args:
         engines: Names, with options if need be (``"particle(n_particles=500)"``), ``module:Class``, or classes.
         memory: What the robot remembers when each of the trials begins; it is not changed.
@@ -175,12 +182,13 @@ def compare_engines(
     courses = [each if isinstance(each, Course) else Course.of(each, memory.assumptions) for each in trials]
     if not courses:
         raise InvalidInputError("trials: none; expected at least one")
-    engine_for(REFERENCE, parameters)
+    reference = REFERENCE_OF_KINDS if parameters.learn_structure else REFERENCE
+    engine_for(reference, parameters)
     tried = {each if isinstance(each, str) else each.name: _Tried.of(each, parameters) for each in engines}
     for course in courses:
         for each in tried.values():
             if each.refused is None:
-                each.follow(memory, parameters, course)
+                each.follow(memory, parameters, reference, course)
         if on_trial is not None:
             on_trial()
     return {name: each.record() for name, each in tried.items()}
@@ -205,15 +213,16 @@ class _Tried:
     @classmethod
     def of(cls, engine: str | type[Inference], parameters: ModelParameters) -> _Tried:
         name, options = name_and_options(engine) if isinstance(engine, str) else (engine, {})
-        found = engine_for(name, parameters)
+        found = engine_for(name, replace(parameters, learn_structure=False))
         check_known(found, found.name, options)
         return cls(found, options)
 
-    def follow(self, memory: RobotMemory, parameters: ModelParameters, course: Course) -> None:
+    def follow(self, memory: RobotMemory, parameters: ModelParameters, against: str, course: Course) -> None:
         """Let the engine and the reference go through a trial in turn, and note how they differ."""
         try:
-            tried = begin_trial(self.engine, memory, parameters, **self.options)
-            reference = begin_trial(REFERENCE, memory, parameters)
+            known = parameters if self.engine.knows_structure else replace(parameters, learn_structure=False)
+            tried = begin_trial(self.engine, memory, known, **self.options)
+            reference = begin_trial(against, memory, parameters)
             for look, evidence in enumerate(course.looks):
                 # Each engine goes first in every other look: the second one finds warm caches.
                 pair = [tried, reference] if look % 2 else [reference, tried]

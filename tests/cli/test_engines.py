@@ -46,6 +46,15 @@ def test_compare_takes_a_memory_and_trials_of_ones_own(run, tmp_path):
     assert plot.read_bytes().startswith(b"\x89PNG")
 
 
+def test_with_kinds_engines_are_held_against_the_one_that_knows_of_them(run):
+    about = ("--trials", 2, "--actions", 6, "--remembered", 8, "--preset", "learned")
+    status, output, error = run("engines", "compare", *about, "--engines", "learned-structure,gtsam", "--json", "-")
+    assert (status, error) == (0, "")
+    engines = json.loads(output)["engines"]
+    assert engines["learned-structure"]["total_variation"]["worst"] == 0
+    assert engines["gtsam"]["total_variation"]["worst"] > 0.1  # it takes each object for a graph of its own
+
+
 def test_compare_prints_a_table(run):
     status, output, error = run(
         "engines", "compare", "--trials", 1, "--actions", 1, "--remembered", 1, "--engines", "bayes-filter"
