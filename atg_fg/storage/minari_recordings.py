@@ -24,6 +24,8 @@ from atg_fg.storage.checked_json import parse_json, read_object, without_none
 from atg_fg.storage.recordings import RECORDING_FORMAT, RecordingSpec, header_of, recording_of
 from atg_fg.worlds.base import looks_space, symbols_of
 
+#: Steps of one dataset, at most.
+MAX_STEPS: Final = 1_000_000
 #: Name of the metadata that holds the names of slots, actions and labels.
 _NAMES: Final = "atg_fg"
 
@@ -90,6 +92,7 @@ def read_minari(name: str) -> Recording:
     minari = _minari()
     try:
         dataset = minari.load_dataset(_checked(name))
+        _check_size(int(dataset.total_steps), name)
         metadata, episodes = dataset.storage.metadata, list(dataset.iterate_episodes())
         about = list(dataset.storage.get_episode_metadata([episode.id for episode in episodes]))
     except FileNotFoundError as error:
@@ -102,6 +105,11 @@ def read_minari(name: str) -> Recording:
         for episode, data in zip(episodes, about, strict=True)
     )
     return recording_of(header, f"{name}: {_NAMES}", trials, name, RecordingSpec())
+
+
+def _check_size(n_steps: int, name: str) -> None:
+    if n_steps > MAX_STEPS:
+        raise InvalidInputError(f"{name}: {n_steps} steps; expected at most {MAX_STEPS}")
 
 
 def _names(text: Any, place: str) -> dict[str, Any]:

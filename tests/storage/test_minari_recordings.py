@@ -183,6 +183,14 @@ def test_a_dataset_that_is_no_recording_is_refused_in_one_line(given, message):
     assert "\n" not in str(refused.value)
 
 
+def test_a_dataset_of_very_many_steps_is_refused_before_it_is_read(monkeypatch):
+    write_minari(RECORDING, "looks-v0")
+    monkeypatch.setattr("atg_fg.storage.minari_recordings.MAX_STEPS", 2)
+    monkeypatch.setattr("minari.dataset.minari_dataset.MinariDataset.iterate_episodes", None)
+    with pytest.raises(InvalidInputError, match="looks-v0: 3 steps; expected at most 2"):
+        read_minari("looks-v0")
+
+
 def test_a_dataset_that_is_not_there_or_damaged_is_refused(datasets):
     with pytest.raises(InvalidInputError, match="nothing-v0: no such dataset here"):
         read_minari("nothing-v0")
