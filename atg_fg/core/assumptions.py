@@ -50,7 +50,14 @@ class Assumptions:
     def extends(self, other: Assumptions) -> bool:
         """Return whether these are the other ones, perhaps with labels more that its open alphabet did not know."""
         ours, theirs = (
-            (each.n_objects, each.n_aspects, each.actions, each.alphabet.slots, each.alphabet.exclusive)
+            (
+                each.n_objects,
+                each.n_aspects,
+                each.actions,
+                each.object_senses,
+                each.alphabet.slots,
+                each.alphabet.exclusive,
+            )
             for each in (self, other)
         )
         both_are_open = self.alphabet.is_open and other.alphabet.is_open

@@ -1,5 +1,7 @@
 """What was written down is the same under an alphabet that knows more labels."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -7,6 +9,7 @@ from atg_fg.core.assumptions import Assumptions, arcube_assumptions
 from atg_fg.core.compact.compact_memory import CompactMemory
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
+from atg_fg.core.object_sense import ObjectSense
 from atg_fg.core.open_alphabets import Relabelling, new_labels
 from atg_fg.core.patterns import Evidence, PatternAlphabet
 
@@ -98,6 +101,8 @@ def test_other_assumptions_are_no_extension():
     assert numbers.extends(numbers)
     assert not there.extends(numbers)
     assert not numbers.extends(there)
+    weighed = replace(there, object_senses=(ObjectSense("weight", 0.5, 0.5, 0.05, "kg"),))
+    assert not weighed.extends(there)
     assert not a_memory(alphabet=NEW).assumptions.extends(there)  # the same labels and one more, numbered otherwise
 
 
