@@ -12,6 +12,7 @@ import pytest
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
+from atg_fg.core.object_sense import ObjectSense
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, PatternAlphabet
 from atg_fg.engines import begin_trial
@@ -36,9 +37,9 @@ TRIAL = [
 ]
 
 
-def a_memory(labels, *, is_open=True, exclusive=False):
+def a_memory(labels, *, is_open=True, exclusive=False, senses=()):
     alphabet = PatternAlphabet.named(("front", "top"), labels, exclusive=exclusive, is_open=is_open)
-    memory = RobotMemory(Assumptions(4, 3, ("turn", "tip"), alphabet))
+    memory = RobotMemory(Assumptions(4, 3, ("turn", "tip"), alphabet, senses))
     for name, looks in (("cup", [("a", "b"), ("b", "c"), ("a", "b")]), ("can", [("c", "a"), ("b", "c")])):
         memory.learn([alphabet.index(look) for look in looks], [0] * (len(looks) - 1), None, name)
     return memory
@@ -68,6 +69,23 @@ def test_the_posterior_is_that_of_an_alphabet_that_had_the_labels_from_the_start
             np.testing.assert_allclose(ours, theirs, atol=1e-12)
     assert memory == a_memory(LABELS)  # what is remembered learns when the trial is over
     assert trial.memory.assumptions.alphabet.names == (*LABELS, "new", "other")
+
+
+@pytest.mark.parametrize("engine", EXACT_ENGINES)
+def test_what_was_felt_stays_felt(engine):
+    senses = (ObjectSense("weight", 0.5, 0.5, 0.05, "kg"),)
+    small, great = a_memory(LABELS, senses=senses), a_memory((*LABELS, "new"), senses=senses)
+    for memory in (small, great):
+        memory.learn([0], [], "cup", measured=[(("weight", 0.3),)])
+    beliefs = []
+    for memory, felt in ((small, {"weight": 0.31}), (great, {"weight": 0.31}), (small, {})):
+        trial = begin_trial(engine, memory, PARAMETERS[0])
+        trial.observe({"front": "a", **felt})
+        trial.act("turn")
+        trial.observe({"front": "new"})
+        beliefs.append(trial.identity().probabilities)
+    np.testing.assert_allclose(beliefs[0], beliefs[1], atol=1e-12)
+    assert beliefs[0][0] > 5 * beliefs[2][0]  # it weighs what the cup does
 
 
 @pytest.mark.parametrize("engine", APPROXIMATE_ENGINES)
