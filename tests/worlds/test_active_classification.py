@@ -20,8 +20,9 @@ def test_without_it_its_extra_is_named(monkeypatch):
         gymnasium.make(ID)
 
 
-# It loads many libraries, which have warnings of their own.
-pytestmark = [pytest.mark.peers, pytest.mark.filterwarnings("ignore")]
+def needs_ap_gym(test):
+    """It loads many libraries, which have warnings of their own."""
+    return pytest.mark.peers(pytest.mark.filterwarnings("ignore")(test))
 
 
 @pytest.fixture(scope="module")
@@ -29,6 +30,7 @@ def ap_gym():
     return pytest.importorskip("ap_gym", reason="ap_gym is not installed: pip install atg-fg[ap-gym]")
 
 
+@needs_ap_gym
 @pytest.mark.parametrize("world", [name for name, place in WORLDS.items() if place.startswith("atg_fg")])
 def test_all_worlds_are_tasks_that_its_checks_take(ap_gym, world):
     task = ap_gym.make(ID, world=world, n_objects=4, slip=0.1, missing=0.1)
@@ -40,6 +42,7 @@ def test_all_worlds_are_tasks_that_its_checks_take(ap_gym, world):
     assert task.prediction_target_space == gymnasium.spaces.Discrete(4)
 
 
+@needs_ap_gym
 def test_the_reward_is_the_loss_of_what_was_predicted(ap_gym):
     """By hand: of 4 objects ln 4 is the loss of a blind guess, over which it is taken."""
     task = ap_gym.make(ID, world="lock", n_objects=4)
@@ -56,12 +59,14 @@ def test_the_reward_is_the_loss_of_what_was_predicted(ap_gym):
         assert reward == pytest.approx(-loss, abs=1e-6)
 
 
+@needs_ap_gym
 def test_the_object_is_not_given_away(ap_gym):
     observation, info = ap_gym.make(ID, n_objects=3).reset(seed=0)
     assert info == {}
     assert observation.shape == (2,)
 
 
+@needs_ap_gym
 def test_its_wrappers_and_vectors_take_it(ap_gym):
     logged = ap_gym.ActiveClassificationLogWrapper(ap_gym.make(ID, world="detector", n_objects=3))
     logged.reset(seed=0)
@@ -76,6 +81,7 @@ def test_its_wrappers_and_vectors_take_it(ap_gym):
     tasks.close()
 
 
+@needs_ap_gym
 @pytest.mark.parametrize(
     ("options", "error", "message"),
     [
@@ -89,6 +95,7 @@ def test_what_cannot_be_made_is_refused(ap_gym, options, error, message):
         ap_gym.make(ID, **options)
 
 
+@needs_ap_gym
 def test_a_world_whose_objects_have_no_numbers_is_refused(ap_gym):
     from atg_fg.worlds.active_classification import ActiveClassificationWorld
     from atg_fg.worlds.registry import make_world
