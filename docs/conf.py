@@ -44,6 +44,7 @@ myst_heading_anchors = 3
 suppress_warnings = ["ref.python"]
 
 autosummary_generate = True
+autodoc_mock_imports = ["ap_gym"]  # an extra by which one class is made
 autodoc_member_order = "bysource"
 autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented"
