@@ -89,7 +89,7 @@ def learn(
                 if teach or name is not None:
                     recorded_trials.teach(each, kept, advance)
                 else:
-                    recorded_trials.recognise(each, kept, chosen, parameters, learn=True, on_trial=advance)
+                    recorded_trials.learn(each, kept, chosen, parameters, advance)
         if not kept.is_kept:
             save_memory(kept, memory)
         document = {"command": "learn", **_learned(kept, memory, recordings)}

@@ -19,6 +19,8 @@ from atg_fg.engines import begin_trial
 from atg_fg.experiments.scores import Score
 from atg_fg.experiments.trial import can_be_learned, follow, learn_from, learn_steps
 from atg_fg.learning.predictive_checks import WORSE_THAN_CHANCE
+from atg_fg.learning.raw_trials import RawTrial
+from atg_fg.learning.structured_memory import StructuredMemory
 
 
 class Recognised(NamedTuple):
@@ -71,6 +73,51 @@ def recognise(
         if on_trial is not None:
             on_trial()
     return found
+
+
+def learn(
+    recording: Recording,
+    memory: RobotMemory,
+    engine: str,
+    parameters: ModelParameters,
+    on_trial: Callable[[], None] | None = None,
+) -> None:
+    """Learn from each trial as one of the object that it is recognised as; nobody asks for the verdicts.
+
+    Where looks err and there are many trials, many are learned from at once (``StructuredMemory.learn_together``); the
+    file of a memory then has no records of these, as it has verdicts of none.
+
+    Args:
+        recording: Its labels and actions are those of the memory.
+        memory: What learns.
+        engine: Name of the engine.
+        parameters: Of the model.
+        on_trial: Called after each trial.
+
+    Raises:
+        InvalidInputError: A look that is none under the memory's assumptions; the message names trial and step.
+    """
+    left = list(recording.trials)
+    while left:
+        at_once = memory.n_together if isinstance(memory, StructuredMemory) else 0
+        if at_once > 1 and isinstance(memory, StructuredMemory):
+            taken, left = left[:at_once], left[at_once:]
+            raw = [_raw(trial, memory, recording.place) for trial in taken]
+            memory.learn_together([trial for trial in raw if trial is not None])
+        else:
+            taken, left = left[:1], left[1:]
+            learn_from(_recognised(taken[0], memory, engine, parameters, recording.place), memory)
+        if on_trial is not None:
+            for _ in taken:
+                on_trial()
+
+
+def _raw(trial: RecordedTrial, memory: RobotMemory, place: str) -> RawTrial | None:
+    """Return what a memory learns from a trial, ``None`` if that is nothing."""
+    looks = _evidence(trial, memory, place)
+    actions = _actions(trial, memory)
+    record = TrialRecord.from_looks(memory.assumptions, looks, actions)
+    return RawTrial.of(looks, actions, memory.assumptions.alphabet) if can_be_learned(TrialSummary.of(record)) else None
 
 
 def teach(recording: Recording, memory: RobotMemory, on_trial: Callable[[], None] | None = None) -> int:

@@ -31,6 +31,7 @@ class TestResult:
         merges: (false merges, merges), if duplicates were merged; false are those of ATGs made from two objects.
         mended: (trials whose verdict is right as it was mended, trials learned from), if any trial was given to another
             ATG than its verdict had said.
+        right: Whether each trial was a success.
     """
 
     __test__ = False
@@ -44,6 +45,7 @@ class TestResult:
     actions: tuple[int, ...] = ()
     merges: tuple[int, int] | None = None
     mended: tuple[int, int] | None = None
+    right: tuple[bool, ...] = ()
 
     def _repr_html_(self) -> str:
         return table_of_tests([self])._repr_html_()
@@ -62,6 +64,7 @@ class Score:
         self.n_trials = self.identified = self.recognised = self.judged_known = self.successes = 0
         self.lost = self.undecided = 0
         self._actions: list[int] = []
+        self._right: list[bool] = []
         self.merges = self.false_merges = 0
         self._learned_from: list[tuple[object, bool]] = []
         self.mended: int | None = None
@@ -95,6 +98,7 @@ class Score:
         self.recognised += seen_before and identified and right_match
         success = identified and (right_match or not seen_before)
         self.successes += success
+        self._right.append(success)
         if self._learns:
             self._presented.add(trial.object)
         if learned is not None:
@@ -159,6 +163,7 @@ class Score:
             tuple(self._actions),
             (self.false_merges, self.merges) if merging else None,
             None if self.mended is None else (self.mended, len(self._learned_from)),
+            tuple(self._right),
         )
 
 

@@ -107,7 +107,7 @@ class EvidenceLearner:
         self.learner, self.assumptions, self.seed = learner, learner.assumptions, learner.seed
         noise = DetectorNoise.unknown(self.assumptions.alphabet.n_symbols)
         self._state = _State(None, noise, np.zeros(0), 0, 0.0, np.zeros(0, dtype=np.int64))
-        self._concluded: tuple[RawTrial, _State, Verdict] | None = None
+        self._concluded: tuple[tuple[RawTrial, ...], _State, Verdict] | None = None
         self._saved: SavedEvidence | None = None
 
     def saved(self) -> SavedEvidence | None:
@@ -154,19 +154,26 @@ class EvidenceLearner:
 
     def conclude(self, trial: RawTrial) -> Verdict:
         """Return what is believed of a trial that has ended, all others sampled again; nothing is learned yet."""
-        if self._concluded is None or self._concluded[1].n_trials != len(self.learner.trials) + 1:
-            self._concluded = None
-        if self._concluded is None or self._concluded[0] != trial:
-            state, verdict = self._sampled(self._current, [*self.learner.trials, trial], self.learner.owners)
-            self._concluded = trial, state, verdict
-        return self._concluded[2]
+        return self._sampled_with((trial,))[1]
+
+    def objects_with(self, trials: Sequence[RawTrial]) -> list[int]:
+        """Return which trials are of one object, as ``objects`` does, of all trials and of more; nothing is learned."""
+        result: list[int] = self._sampled_with(tuple(trials))[0].partition.tolist()
+        return result
+
+    def _sampled_with(self, more: tuple[RawTrial, ...]) -> tuple[_State, Verdict]:
+        n_trials = len(self.learner.trials) + len(more)
+        if self._concluded is None or self._concluded[0] != more or self._concluded[1].n_trials != n_trials:
+            sampled = self._sampled(self._current, [*self.learner.trials, *more], self.learner.owners)
+            self._concluded = more, *sampled
+        return self._concluded[1:]
 
     def learn(self) -> None:
-        """Learn from the trial that the learner has just been given."""
+        """Learn from the trials that the learner has just been given."""
         trials, owners = self.learner.trials, self.learner.owners
         done, self._concluded = self._concluded, None
         state = self._awake()
-        if done is not None and done[0] == trials[-1] and done[1].n_trials == len(trials):
+        if done is not None and done[1].n_trials == len(trials) and done[0] == tuple(trials[-len(done[0]) :]):
             state = done[1]
         elif state.n_trials == len(trials) - 1:
             state = self._sampled(state, trials, owners[:-1])[0]
@@ -234,9 +241,9 @@ class EvidenceLearner:
         return self._state
 
     def _sampled(self, state: _State, trials: Sequence[RawTrial], owners: Sequence[str]) -> tuple[_State, Verdict]:
-        """Return what is learned from trials, the last of which has no owner yet, and the verdict on it."""
+        """Return what is learned from trials, the last of which have no owner yet, and the verdict on the last one."""
         names = tuple(dict.fromkeys(owners))
-        numbers = np.append(self._numbers(owners, names), -1)
+        numbers = np.append(self._numbers(owners, names), np.full(len(trials) - len(owners), -1))
         rng = np.random.default_rng((self.seed, len(trials)))
         population = copy.deepcopy(state.population) or self._population()
         task = self._task(trials, state.noise)

@@ -99,6 +99,8 @@ class StructureLearner:
             search: Whether other structures may be searched for.
         """
         self._append(owner, trial)
+        if not self._can_explain:
+            return
         self._select()
         if is_milestone(len(self.trials)):
             if search:
@@ -126,7 +128,7 @@ class StructureLearner:
 
     def settle(self) -> None:
         """Keep the best of the structures at hand, best first, and estimate the rates: trials were put together."""
-        if self.trials:
+        if self._sets:
             self._select()
             self._estimate_rates()
             self._select()
@@ -162,6 +164,11 @@ class StructureLearner:
     def candidates(self) -> tuple[SharedStructure, ...]:
         """Structures that are kept up, best first."""
         return tuple(candidate.structure for candidate in self._candidates)
+
+    @property
+    def _can_explain(self) -> bool:
+        """Whether structures are for objects like these: symbols do not repeat within a pattern."""
+        return self.assumptions.alphabet.exclusive
 
     @property
     def gain(self) -> float:
@@ -203,7 +210,7 @@ class StructureLearner:
 
     def uncertain(self, names: Sequence[str]) -> UncertainObjects | None:
         """Return what is believed of plain objects whose actions are uncertain; ``None`` if nothing was learned yet."""
-        if not self.trials:
+        if not self._sets:
             return None
         of = np.zeros(len(names) + 1)
         for weight, each in zip(self._weights, self._sets, strict=True):
@@ -335,6 +342,8 @@ class StructureLearner:
 
     def _choose(self) -> None:
         """Choose the sets of kinds among the candidates."""
+        if not self._can_explain:
+            return
         self._plain.catch_up(self.trials, self.owners)
         for each in self._candidates:
             each.catch_up(self.trials, self._owner_indices, self.rates)

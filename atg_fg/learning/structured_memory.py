@@ -20,16 +20,19 @@ from atg_fg.core.memory import RobotMemory
 from atg_fg.core.merging import Merge
 from atg_fg.core.open_alphabets import Relabelling
 from atg_fg.core.parameters import ModelParameters
-from atg_fg.core.patterns import Confidences, Detection, Measured, SlotLikelihoods
+from atg_fg.core.patterns import Confidences, Detection, Evidence, Measured, SlotLikelihoods
 from atg_fg.core.sense import Sense, SensedTrial
 from atg_fg.core.transactions import one_transaction
 from atg_fg.learning.evidence_learner import EvidenceLearner, SavedEvidence
 from atg_fg.learning.learner import StructureLearner
+from atg_fg.learning.milestones import next_milestone
 from atg_fg.learning.raw_trials import RawTrial
 
 #: Nats of evidence, and least number of trials, by which one model of looks outdoes the other so that it rests.
 OUTDONE: Final = 20.0
 FIRST_TRIALS: Final = 8
+#: Trials that are always learned from one by one: what is learned from the first ones goes through many hands.
+FIRST_ALONE: Final = 48
 
 
 #: Gain of a model whose structure is mistaken.
@@ -132,8 +135,7 @@ class StructuredMemory(RobotMemory):
         felt = tuple(measured) if any(measured) else ()
         trial = RawTrial(tuple(detections), tuple(actions), tuple(confidences), tuple(likelihoods), felt)
         trial.check(self.assumptions)
-        # Where there is no other model than the one in which looks err, nothing is searched for in vain.
-        before = self.gain if len(self.learner.trials) >= FIRST_TRIALS or np.isinf(self.gain) else 0.0
+        before = self.gain if len(self.learner.trials) >= FIRST_TRIALS else 0.0
         self.learner.learn(self[name].name, trial, search=before < OUTDONE)
         # A model that is far behind rests; it looks at all trials again whenever their number has doubled.
         if before > -OUTDONE or len(self.learner.trials).bit_count() == 1:
@@ -142,6 +144,42 @@ class StructuredMemory(RobotMemory):
             if self.erring and not taught:
                 self._mend()
         return self.learner.owners[-1]
+
+    @property
+    def n_together(self) -> int:
+        """How many trials may be learned from at once: those up to the next milestone, none while models are rivals."""
+        n_trials = len(self.learner.trials)
+        if n_trials < FIRST_ALONE or self.gain < OUTDONE or self.sense is not None:
+            return 0
+        return next_milestone(n_trials) - n_trials
+
+    @one_transaction
+    def learn_together(self, trials: Sequence[RawTrial]) -> list[str]:
+        """Learn from raw trials at once, without a verdict on each; return the names of the ATGs that they are of.
+
+        All raw trials are sampled again once for all of these, where ``learn_shared`` does so for each.
+
+        Args:
+            trials: In each of them a pattern was seen whole; ``n_together`` of them at most.
+
+        Raises:
+            InvalidInputError: A trial is none under these assumptions, or there are too many.
+        """
+        if len(trials) > self.n_together:
+            raise InvalidInputError(f"trials: {len(trials)}; expected at most {self.n_together} to learn from together")
+        for number, trial in enumerate(trials):
+            trial.check(self.assumptions, f"trial {number}")
+        objects = self.evidence.objects_with(trials)
+        names = self._names_of(objects)
+        for trial, number in zip(trials, objects[len(self.learner.trials) :], strict=True):
+            name, alphabet = names[number], self.assumptions.alphabet
+            patterns = [Evidence.of_detection(alphabet, each).pattern for each in trial.detections]
+            self.learn(patterns, trial.actions, name if name in self.names else None, name, trial.measured)
+            self.learner.learn(name, trial, search=False)
+        self.evidence.learn()
+        self._gain = self._evident_gain()
+        self._mend()
+        return self.learner.owners[-len(trials) :]
 
     @property
     def erring(self) -> bool:
@@ -227,10 +265,19 @@ class StructuredMemory(RobotMemory):
         self.evidence.forget_verdict()
 
     def _mend(self) -> None:
-        """Give raw trials to the ATGs that what was sampled says; a name stays with what most of its looks are of."""
-        owners, objects = self.learner.owners, self.evidence.objects()
+        """Give raw trials to the ATGs that what was sampled says."""
+        objects = self.evidence.objects()
+        names = self._names_of(objects)
+        self.reassign({trial: names[number] for trial, number in enumerate(objects)})
+
+    def _names_of(self, objects: Sequence[int]) -> dict[int, str]:
+        """Return a name for each object; one that is there stays with what most of its looks are of.
+
+        Args:
+            objects: Number of the object of each raw trial, and of some to come.
+        """
         looks: Counter[tuple[int, str]] = Counter()
-        for trial, name, number in zip(self.learner.trials, owners, objects, strict=True):
+        for trial, name, number in zip(self.learner.trials, self.learner.owners, objects, strict=False):
             looks[number, name] += len(trial.detections)
         names: dict[int, str] = {}
         # Of as many looks, the object that was met first keeps the name.
@@ -242,7 +289,7 @@ class StructuredMemory(RobotMemory):
                 taken = {*self._graphs, *self._dropped, *names.values()}
                 new = (f"object-{index:03d}" for index in itertools.count(len(taken)))
                 names[number] = next(name for name in new if name not in taken)
-        self.reassign({trial: names[number] for trial, number in enumerate(objects)})
+        return names
 
     @property
     def log_erring_weights(self) -> tuple[float, float]:

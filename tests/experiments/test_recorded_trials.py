@@ -6,11 +6,16 @@ from dataclasses import replace
 import pytest
 
 from atg_fg.core.assumptions import Assumptions
+from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.patterns import Evidence, PatternAlphabet
 from atg_fg.core.recordings import RecordedLook, RecordedTrial, Recording
 from atg_fg.core.records import TrialRecord
+from atg_fg.experiments import recorded_trials
 from atg_fg.experiments.recorded_trials import Recognised, improbable_trials, recognise
+from atg_fg.experiments.simulated_recording import simulated_recording
+from atg_fg.learning import structured_memory
+from atg_fg.learning.evidence_learner import EvidenceLearner
 from atg_fg.learning.predictive_checks import WORSE_THAN_CHANCE
 from atg_fg.learning.structured_memory import memory_for
 from atg_fg.storage.presets import preset
@@ -100,3 +105,32 @@ def test_trials_of_likelihoods_keep_their_atg_when_they_change_hands_and_labels_
     memory.reassign({2: "object-000"})
     assert memory["object-000"].counts == {(0, 0, 1): 2, (1, 0, 2): 2}
     assert "cup" not in memory.names
+
+
+def test_beyond_the_first_trials_many_are_learned_from_at_once(monkeypatch):
+    monkeypatch.setattr(structured_memory, "FIRST_ALONE", 4)
+    recording = simulated_recording("detector", 3, 11, 8, seed=101)
+    memory = memory_for(preset("learned"), RobotMemory(recording.assumptions()))
+    done, verdicts = [], []
+    conclude = EvidenceLearner.conclude
+    monkeypatch.setattr(EvidenceLearner, "conclude", lambda *args: verdicts.append(1) or conclude(*args))
+    recorded_trials.learn(recording, memory, "learned-structure", preset("learned"), lambda: done.append(len(memory)))
+    assert len(done) == len(memory.learner.trials) == 11
+    assert 1 < len(verdicts) <= 8  # verdicts are asked for the first trials alone
+    in_truth = {}
+    for trial, name in zip(recording.trials, memory.learner.owners, strict=True):
+        in_truth.setdefault(name, set()).add(trial.object)
+    assert set(in_truth) == set(memory.names)
+    assert all(len(objects) == 1 for objects in in_truth.values())
+    # ATGs are those of their raw trials, and learning goes on from there.
+    assert [memory[name] for name in memory.names] == [memory._estimated(name) for name in memory.names]
+    with pytest.raises(InvalidInputError, match="trials: 9; expected at most 2 to learn from together"):
+        memory.learn_together(memory.learner.trials[:9])
+
+
+def test_trials_are_learned_from_one_by_one_while_models_are_rivals():
+    recording = simulated_recording("ideal", 3, 2, 4, seed=101)
+    memory = memory_for(preset("learned"), RobotMemory(recording.assumptions()))
+    recorded_trials.learn(recording, memory, "learned-structure", preset("learned"))
+    assert memory.n_together == 0
+    assert len(memory.learner.trials) == 2

@@ -70,6 +70,7 @@ def test_a_verdict_counts_as_the_atg_that_its_trial_is_put_in_when_it_ends():
     memory.learn_shared(name, [(0,), (1,)], [0])
     assert not score.add(trial("a", "object-001"), "object-001", memory)
     assert score.result(0).success == (3, 5)
+    assert score.result(0).right == (True, False, True, True, False)
 
 
 def test_trials_are_given_back_and_atgs_are_as_they_were():
