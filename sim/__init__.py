@@ -30,6 +30,15 @@ def make_picture_box(**options: Any) -> gymnasium.Env[Any, Any]:
     return PictureBoxWorld(**options)
 
 
+def make_meshes(**options: Any) -> gymnasium.Env[Any, Any]:
+    """Return a ``sim.worlds.meshes_world.MeshesWorld``; its module is imported only now."""
+    require_simulator()
+    import_quietly("pybullet")
+    from sim.worlds.meshes_world import MeshesWorld
+
+    return MeshesWorld(**options)
+
+
 def make_robonaut_arcube(**options: Any) -> gymnasium.Env[Any, Any]:
     """Return a ``sim.worlds.robonaut_arcube_world.RobonautARcubeWorld``; its module is imported only now."""
     from sim.worlds.robonaut_arcube_world import RobonautARcubeWorld
@@ -55,6 +64,9 @@ gymnasium.register(id="sim/RenderedARcube-v0", entry_point="sim:make_rendered_ar
 
 
 gymnasium.register(id="sim/PictureBox-v0", entry_point="sim:make_picture_box")
+
+
+gymnasium.register(id="sim/Meshes-v0", entry_point="sim:make_meshes")
 
 
 gymnasium.register(id="sim/RobonautARcube-v0", entry_point="sim:make_robonaut_arcube")

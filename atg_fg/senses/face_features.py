@@ -1,4 +1,4 @@
-"""What the picture on a square face looks like, whichever of its four sides is up: colours and gradients of a crop.
+"""What the picture on a square face looks like, whichever of its four sides is up, and what a whole view looks like.
 
 A crop is divided into a grid. A quarter turn of the crop permutes its cells and the directions in them, so the four
 turns of a crop make a signal over the group C₄, and the magnitudes of its Fourier transform are the same for all four.
@@ -23,8 +23,11 @@ FaceFeatures: TypeAlias = Callable[[Image], FloatArray]
 
 #: Name of ``colours_and_gradients``.
 DEFAULT_FEATURES: Final = "colours-and-gradients"
-#: Side of a crop, pixels.
+#: Name of ``view_features``.
+VIEW_FEATURES: Final = "grid-and-gradients"
+#: Side of a crop of a face, and of a whole view, pixels.
 CROP: Final = 48
+VIEW: Final = 96
 _GRID: Final = 6  # cells a side
 _DIRECTIONS: Final = 8  # of gradients, without their sign
 _QUARTER: Final = _GRID // 2
@@ -40,6 +43,32 @@ def colours_and_gradients(crop: Image) -> FloatArray:
         InvalidInputError: Not RGB, or not a square of at least ``CROP`` pixels.
     """
     check_image(crop, "crop", (CROP, CROP))
+    colours, gradients = _grids(crop)
+    turned = [
+        np.concatenate(
+            (np.rot90(colours, turn), np.roll(np.rot90(gradients, turn), turn * _DIRECTIONS // 2, axis=-1)), axis=-1
+        )
+        for turn in range(4)
+    ]
+    quarter = np.array([each[:_QUARTER, :_QUARTER].ravel() for each in turned])
+    # Of the four magnitudes the last is that of the second again.
+    features: FloatArray = np.abs(np.fft.fft(quarter, axis=0))[:3].ravel().astype(np.float64) / 2
+    return features
+
+
+def view_features(view: Image) -> FloatArray:
+    """Return the features of a whole view, shape [396]: those of a crop for the way in which it is turned.
+
+    Raises:
+        InvalidInputError: Not RGB, or not a square of ``VIEW`` pixels.
+    """
+    check_image(view, "view", (VIEW, VIEW))
+    features: FloatArray = np.concatenate(_grids(view), axis=-1).ravel().astype(np.float64)
+    return features
+
+
+def _grids(crop: Image) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return colours and directions of gradients in each cell, shapes [cells, cells, 3] and [cells, cells, 8]."""
     lab = cv2.cvtColor(crop, cv2.COLOR_RGB2LAB).astype(np.float32)
     cells = (_GRID, _GRID)
     colours = cv2.resize(lab, cells, interpolation=cv2.INTER_AREA) * _COLOUR_SCALE
@@ -53,16 +82,7 @@ def colours_and_gradients(crop: Image) -> FloatArray:
         np.ascontiguousarray(strength[..., None] * np.clip(1 - apart, 0, 1)), cells, interpolation=cv2.INTER_AREA
     )
     gradients = np.sqrt(gradients / (gradients.sum(axis=-1, keepdims=True) + _LEAST_GRADIENT))
-    turned = [
-        np.concatenate(
-            (np.rot90(colours, turn), np.roll(np.rot90(gradients, turn), turn * _DIRECTIONS // 2, axis=-1)), axis=-1
-        )
-        for turn in range(4)
-    ]
-    quarter = np.array([each[:_QUARTER, :_QUARTER].ravel() for each in turned])
-    # Of the four magnitudes the last is that of the second again.
-    features: FloatArray = np.abs(np.fft.fft(quarter, axis=0))[:3].ravel().astype(np.float64) / 2
-    return features
+    return np.asarray(colours), np.asarray(gradients)
 
 
 def check_image(image: Image, place: str, size: tuple[int, int] | None = None) -> None:
@@ -88,23 +108,30 @@ def rectified(frame: Image, corners: FloatArray, size: int = CROP) -> Image:
     return np.asarray(cv2.warpPerspective(frame, homography, (size, size), flags=cv2.INTER_AREA), dtype=np.uint8)
 
 
-def face_features(name: str) -> FaceFeatures:
-    """Return features by name: ``DEFAULT_FEATURES``, or ``module:function`` of a user's own, such as an embedding.
+_FEATURES: Final[dict[str, FaceFeatures]] = {
+    DEFAULT_FEATURES: colours_and_gradients,
+    VIEW_FEATURES: view_features,
+}
 
-    The name runs code: it is to come from a user, never from a file.
+
+def face_features(name: str) -> FaceFeatures:
+    """Return features by name.
+
+    That is ``DEFAULT_FEATURES``, ``VIEW_FEATURES``, or ``module:function`` of a user's own, such as an embedding.
+    Such a name runs code: it is to come from a user, never from a file.
 
     Raises:
         InvalidInputError: There is no such function.
     """
-    if name == DEFAULT_FEATURES:
-        return colours_and_gradients
+    if name in _FEATURES:
+        return _FEATURES[name]
     module, _, attribute = name.partition(":")
     try:
         found = getattr(importlib.import_module(module), attribute) if module and attribute else None
     except (ImportError, AttributeError, ValueError) as error:
         raise InvalidInputError(f"features: {name!r}: {error}; expected module:function on Python's path") from error
     if not callable(found):
-        raise InvalidInputError(f"features: {name!r}; expected {DEFAULT_FEATURES!r} or module:function")
+        raise InvalidInputError(f"features: {name!r}; expected {' or '.join(map(repr, _FEATURES))} or module:function")
 
     def checked(crop: Image) -> FloatArray:
         values: FloatArray = np.asarray(found(crop), dtype=np.float64)

@@ -24,6 +24,7 @@ WORLDS: Final[dict[str, str]] = {
     "rendered": "sim:sim/RenderedARcube-v0",
     "robonaut": "sim:sim/RobonautARcube-v0",
     "picture-box": "sim:sim/PictureBox-v0",
+    "meshes": "sim:sim/Meshes-v0",
     "robonaut-picture-box": "sim:sim/RobonautPictureBox-v0",
     "prism": "atg_fg.worlds:atg_fg/HexagonalPrism-v0",
     "lock": "atg_fg.worlds:atg_fg/RingLock-v0",

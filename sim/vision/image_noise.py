@@ -38,7 +38,7 @@ class Imaging:
 
     def frame(self, camera: Camera, client: int, rng: np.random.Generator) -> NDArray[np.uint8]:
         """Return what the camera sees, RGB, shape [height, width, 3]. Draws nothing for what is zero."""
-        return self._developed(camera.render(client, self._light(rng)), rng)
+        return self.developed(camera.render(client, self.light(rng)), rng)
 
     def frame_with_depth(
         self, camera: Camera, client: int, rng: np.random.Generator
@@ -47,11 +47,11 @@ class Imaging:
 
         Where nothing is measured, the depth is zero.
         """
-        frame, depth = camera.render_with_depth(client, self._light(rng))
-        frame = self._developed(frame, rng)
+        frame, depth = camera.render_with_depth(client, self.light(rng))
+        frame = self.developed(frame, rng)
         return frame, noisy_depth(depth, camera.intrinsics[0, 0], self.depth_noise, rng)
 
-    def _developed(self, frame: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint8]:
+    def developed(self, frame: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint8]:
         """Return a frame with blur and noise."""
         if self.blur:
             frame = np.asarray(cv2.GaussianBlur(frame, (0, 0), self.blur), dtype=np.uint8)
@@ -60,7 +60,8 @@ class Imaging:
             frame = np.clip(np.round(noisy), 0, 255).astype(np.uint8)
         return frame
 
-    def _light(self, rng: np.random.Generator) -> Light:
+    def light(self, rng: np.random.Generator) -> Light:
+        """Return the lamp of one look."""
         if not self.light_jitter:
             return Light()
         change = self.light_jitter * rng.uniform(-1, 1, 3)

@@ -3,35 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Any, Final
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.object_sense import ObjectSense
 from atg_fg.core.patterns import FloatArray, PatternAlphabet
-from atg_fg.senses.appearance import APPEARANCE, SEEN, AppearanceSense, appearance_space
 from atg_fg.senses.face_features import CROP, DEFAULT_FEATURES, face_features
 from atg_fg.senses.feature_space import FeatureSpace
-from atg_fg.senses.object_readings import observed_readings, with_readings
 from atg_fg.worlds.arcube import (
     ACTION_SOURCES,
     FACES,
     FRONT,
     ORIENTATIONS,
-    SUCCESSORS,
     TOP,
     rotation_of,
     shown_pattern,
 )
-from atg_fg.worlds.base import FiniteStateWorld
 from sim.bodies.pictures import TYPICAL_WEIGHT, WEIGHT_SPREAD, Difference, draw_picture, make_picture_boxes
 from sim.vision.camera import Camera
 from sim.vision.picture_box_camera import PictureBoxCamera
+from sim.worlds.appearance_world import AppearanceWorld
 from sim.worlds.rendered_world import checked_size
 
 #: Numbers that classes of appearance can have.
@@ -52,12 +48,8 @@ _CALIBRATION_BOXES, _DIMENSIONS = 24, 24
 _WITHIN: Final = 3.0
 
 
-class BoxesWithPictures(FiniteStateWorld):
-    """Boxes that three actions turn: flip, left, right; of what is in front and on top the features are told.
-
-    An observation has the features of both faces (``appearance``), and which of them were ``seen``. Where the robot
-    feels something of a box as a whole, such as its weight, it also has that, and which of it was ``measured``. A
-    subclass turns boxes and has a camera: what is told is of ``crops``, ``seen`` and ``felt`` as it left them.
+class BoxesWithPictures(AppearanceWorld):
+    """Boxes with pictures: the slots are what is in front and on top.
 
     Args:
         n_objects: How many boxes there are.
@@ -70,13 +62,9 @@ class BoxesWithPictures(FiniteStateWorld):
 
     Attributes:
         boxes: The boxes, and the pictures on them.
-        features: Makes features of a crop.
-        crops: The faces in front and on top that were cut out of the last frame, RGB, shape [2, side, side, 3].
-        seen: Which of them were found, shape [2].
-        felt: What was measured by ``object_senses`` in the last action, by their names.
     """
 
-    state_name = "orientation"
+    within = _WITHIN
 
     def __init__(
         self,
@@ -91,46 +79,16 @@ class BoxesWithPictures(FiniteStateWorld):
         **noise: float,
     ) -> None:
         self.boxes = make_picture_boxes(n_objects, objects_seed, look_alikes=look_alikes, differ_in=differ_in)
-        n_actions, n_slots = len(ACTION_SOURCES), len(_SLOTS)
-        super().__init__(n_objects, n_actions, n_slots, MOST_CLASSES, render_mode=render_mode, **noise)
-        self.features = face_features(features)
-        self.alphabet = PatternAlphabet(_SLOTS, MOST_CLASSES, exclusive=False)
-        self._features_name = features
-        blank = np.zeros((CROP, CROP, 3), dtype=np.uint8)
-        self.object_senses = object_senses
-        looks = appearance_space(n_slots, len(self.features(blank)))
-        self.observation_space: Any = with_readings(looks, object_senses)
-        self.crops: NDArray[np.uint8] = np.zeros((n_slots, CROP, CROP, 3), dtype=np.uint8)
-        self.seen: NDArray[np.int8] = np.ones(n_slots, dtype=np.int8)
-        self.felt: dict[str, float] = {}
+        alphabet = PatternAlphabet(_SLOTS, MOST_CLASSES, exclusive=False)
+        told: dict[str, Any] = {"features": features, "side": CROP, "object_senses": object_senses, **noise}
+        super().__init__(n_objects, alphabet, render_mode=render_mode, **told)
 
-    @cached_property
-    def sense(self) -> AppearanceSense:
-        """One that reads these observations and knows no class yet; it takes seconds to calibrate the first one."""
-        return AppearanceSense(calibrated_space(self._features_name), self.alphabet, within=_WITHIN)
-
-    @property
-    def assumptions(self) -> Assumptions:
-        """What a robot in this world takes for granted."""
-        actions = tuple(ACTION_SOURCES)
-        return Assumptions(len(self.boxes.faces), len(ORIENTATIONS), actions, self.alphabet, self.object_senses)
-
-    def _n_states(self) -> int:
-        return len(ORIENTATIONS)
-
-    def _successor(self, action: int) -> int:
-        return SUCCESSORS[self.state][action]
+    def feature_space(self) -> FeatureSpace:
+        """Return the space of features, calibrated on pictures that are on no box of any world."""
+        return calibrated_space(self.features_name)
 
     def _pattern(self) -> tuple[int, ...]:
         return shown_pattern(self.boxes.faces[self.object], self.state)
-
-    def _look(self) -> dict[str, NDArray[Any]]:
-        appearance = np.array([self.features(crop) for crop in self.crops], dtype=np.float64)
-        seen = self.seen.copy()
-        if self.missing:
-            seen[self.np_random.random(len(_SLOTS)) < self.missing] = 0
-        felt = observed_readings(self.object_senses, self.felt)
-        return {APPEARANCE: appearance * seen[:, None], SEEN: seen, **felt}
 
 
 class PictureBoxWorld(BoxesWithPictures):
@@ -222,9 +180,7 @@ class PictureBoxWorld(BoxesWithPictures):
 
     def step(self, action: np.int64) -> tuple[Any, float, bool, bool, dict[str, Any]]:
         """Turn the box, which is lifted for it, and look."""
-        for sense in self.object_senses:
-            error = float(np.exp(sense.error * self.np_random.standard_normal()))
-            self.felt[sense.name] = float(self.boxes.weights[self.object]) * error
+        self.feel({"weight": float(self.boxes.weights[self.object])})
         return super().step(action)
 
     def _look(self) -> dict[str, NDArray[Any]]:

@@ -144,9 +144,45 @@ def test_a_memory_of_other_features_or_of_none_is_refused(world):
         run_trial(world, inference, RandomPolicy(), 1, np.random.default_rng(0))
 
 
+def test_boxes_that_differ_in_weight_alone_look_the_same():
+    boxes = make_picture_boxes(60, 5, look_alikes=0.5, differ_in="weight")
+    looks = Counter(boxes.faces)
+    assert 20 <= len(looks) <= 40
+    assert len(set(boxes.weights.tolist())) == 60
+    assert make_picture_boxes(60, 5).faces[0] == boxes.faces[0]
+
+
+def test_a_weight_is_felt_when_a_box_is_turned_and_learned_with_its_looks():
+    with make_world_with("picture-box", 3, 1, weight=True) as felt:
+        memory = RobotMemory(assumptions_of(felt, 3), sense=sense_of(felt))
+        first, _ = felt.reset(seed=1, options={"object": 2})
+        assert felt.observation_space.contains(first)
+        assert first["measured"].tolist() == [0]
+        second = felt.step(np.int64(0))[0]
+        assert felt.observation_space.contains(second)
+        true = felt.get_wrapper_attr("boxes").weights[2]
+        assert second["weight"][0] == pytest.approx(true, rel=0.35)
+        (record,) = trials(felt, memory, 1)
+        measured = [step.truth.get("measured") for step in record.steps]
+        assert measured[0] is None
+        assert all(each["weight"] > 0 for each in measured[1:])
+        assert memory["object-000"].measured["weight"].count == 6
+
+
+def test_a_memory_that_counts_on_weights_is_refused_where_there_are_none(world):
+    with make_world_with("picture-box", 12, 3, weight=True) as felt:
+        memory = RobotMemory(assumptions_of(felt, 12), sense=sense_of(felt))
+        inference = begin_trial("bayes-filter", memory, preset("default"))
+        with pytest.raises(InvalidInputError, match="expected readings of it, too: weight, measured"):
+            run_trial(world, inference, RandomPolicy(), 1, np.random.default_rng(0))
+
+
 @pytest.mark.parametrize(
     ("options", "message"),
     [
+        ({"weight": "yes"}, "weight: 'yes'; expected true or false"),
+        ({"differ_in": "smell"}, "differ_in: 'smell'; expected one of: face, weight"),
+        ({"weight_error": -0.1, "weight": True}, "object sense 'weight': error -0.1"),
         ({"features": "no_such_module:embed"}, "features: 'no_such_module:embed'"),
         ({"features": "sift"}, "expected 'colours-and-gradients' or module:function"),
         ({"look_alikes": 2.0}, "look_alikes: 2.0; expected a probability"),
