@@ -131,7 +131,7 @@ def face_features(name: str) -> FaceFeatures:
     except (ImportError, AttributeError, ValueError) as error:
         raise InvalidInputError(f"features: {name!r}: {error}; expected module:function on Python's path") from error
     if not callable(found):
-        raise InvalidInputError(f"features: {name!r}; expected {' or '.join(map(repr, _FEATURES))} or module:function")
+        raise InvalidInputError(f"features: {name!r}; expected {', '.join(map(repr, _FEATURES))} or module:function")
 
     def checked(crop: Image) -> FloatArray:
         values: FloatArray = np.asarray(found(crop), dtype=np.float64)

@@ -184,7 +184,7 @@ def test_a_memory_that_counts_on_weights_is_refused_where_there_are_none(world):
         ({"differ_in": "smell"}, "differ_in: 'smell'; expected one of: face, weight"),
         ({"weight_error": -0.1, "weight": True}, "object sense 'weight': error -0.1"),
         ({"features": "no_such_module:embed"}, "features: 'no_such_module:embed'"),
-        ({"features": "sift"}, "expected 'colours-and-gradients' or module:function"),
+        ({"features": "sift"}, "expected 'colours-and-gradients', 'grid-and-gradients' or module:function"),
         ({"look_alikes": 2.0}, "look_alikes: 2.0; expected a probability"),
         ({"image_noise": -1.0}, "image_noise: -1.0; expected a finite number"),
         ({"n_objects": 0}, "n_objects: 0"),
