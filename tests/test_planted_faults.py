@@ -12,8 +12,11 @@ import pytest
 ROOT = Path(__file__).parents[1]
 #: The first two chunks of random models, every engine, the oracle beside them.
 TESTS = ["tests/engines/test_agreement.py", "-k", "posterior and (-0] or -1])"]
-#: The compiled filter beside the one in NumPy.
-TESTS_OF_KERNELS = ["tests/inference/kernels/test_compiled_filter.py"]
+#: Of faults in these folders: the compiled filter beside the one in NumPy; kinds of objects beside sums over all cases.
+TESTS_OF = {
+    "inference/kernels/": ["tests/inference/kernels/test_compiled_filter.py"],
+    "learning/": [f"tests/learning/test_{name}.py" for name in ("state_merging", "kinds", "plain_evidence")],
+}
 
 
 @dataclass(frozen=True)
@@ -129,13 +132,66 @@ FAULTS = [
         "while place > first and not _precedes(tables, place - 1, action, target, source):",
         "while False:",
     ),
+    Fault(
+        "merging: states of different slots are one",
+        "learning/state_merging.py",
+        "if self._label[one] != self._label[two] or self._looks[one] & self._looks[two]:",
+        "if self._looks[one] & self._looks[two]:",
+    ),
+    Fault(
+        "merging: nothing folds backward",
+        "learning/state_merging.py",
+        "for state, key, other in ((before, action, after), (after, back, before)):",
+        "for state, key, other in ((before, action, after),):",
+    ),
+    Fault(
+        "merging: a state in view is not that of its slot",
+        "learning/state_merging.py",
+        "if place < self._n_slots:",
+        "if place < self._n_slots - 1:",
+    ),
+    Fault(
+        "kinds: all are as probable beforehand",
+        "learning/kinds.py",
+        "before = np.array([*PLAIN_BEFORE, *[1.0] * (table.shape[1] - N_PLAIN)])",
+        "before = np.ones(table.shape[1])",
+    ),
+    Fault(
+        "kinds: a trial with too many errors is one of the kind",
+        "learning/kinds.py",
+        "np.minimum(kind.log_evidence, most - REFUSED)",
+        "kind.log_evidence",
+    ),
+    Fault(
+        "kinds: the doubt about which kind a trial is of does not count",
+        "learning/kind_kernels.py",
+        "bound += share * (table[row, kind] - np.log(share))",
+        "bound += share * table[row, kind] + 1.0",
+    ),
+    Fault(
+        "plain evidence: nothing is learned within the trial",
+        "learning/kind_kernels.py",
+        "if patterns[time] >= 0:",
+        "if patterns[time] >= len(evidence[0]):",
+    ),
+    Fault(
+        "plain evidence: objects never met count as one",
+        "learning/plain_evidence.py",
+        "math.log(n_objects - len(self._graphs))",
+        "0.0",
+    ),
+    Fault(
+        "plain evidence: the object that a trial is filed under is not there",
+        "learning/plain_evidence.py",
+        "own = of_each[:, rivals.index(owner)] if owner in rivals else fresh",
+        "own = fresh",
+    ),
 ]
 QUICK = FAULTS[:2]
 
 
-def passes_its_tests(folder: Path, of_kernels: bool = False) -> bool:
-    """Run the copy's own tests in the folder of the copy: of the engines, all in NumPy, or of compiled loops."""
-    tests = TESTS_OF_KERNELS if of_kernels else TESTS
+def passes_its_tests(folder: Path, tests: list[str] = TESTS) -> bool:
+    """Run the copy's own tests in the folder of the copy: of the engines, all in NumPy, or others."""
     command = [sys.executable, "-m", "pytest", "-x", "-q", "-p", "no:cacheprovider", "-n", "0", *tests]
     environment = {**os.environ, "PYTHONPATH": str(folder), "ATG_FG_KERNELS": "0"}
     done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
@@ -156,9 +212,8 @@ def check_is_caught(fault: Fault, copy: Path) -> None:
     text = file.read_text()
     assert text.count(fault.right) == 1, f"{fault.file} has changed; expected once: {fault.right}"
     file.write_text(text.replace(fault.right, fault.wrong))
-    assert not passes_its_tests(copy, of_kernels=fault.file.startswith("inference/kernels/")), (
-        f"not caught: {fault.name}"
-    )
+    tests = next((tests for folder, tests in TESTS_OF.items() if fault.file.startswith(folder)), TESTS)
+    assert not passes_its_tests(copy, tests), f"not caught: {fault.name}"
 
 
 def test_the_copy_without_a_fault_passes(copy):

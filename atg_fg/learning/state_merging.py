@@ -226,6 +226,7 @@ class _Automaton:
             one, two = map(self._find, to_do.pop())
             if one == two:
                 continue
+            # Two symbols of one look would sooner or later be in different slots: that they contradict is said at once.
             if self._label[one] != self._label[two] or self._looks[one] & self._looks[two]:
                 raise ContradictionError
             if len(self._edges[one]) < len(self._edges[two]):
