@@ -175,16 +175,21 @@ results-structure: $(READY)  ## Run the experiments on learned structure (about 
 	$(BIN)/atg-fg ablation --variants "default;learned" --noises ideal --actions 10 --tests 3 \
 		--worlds prism,lock,lid-box,repeated-tags \
 		--log results/ablation_worlds.jsonl --json results/ablation_other_worlds.json
-	for world in half-and-half random-atg; do \
-		$(BIN)/atg-fg ablation --variants "default;learned" --noises ideal --actions 10 --worlds $$world --tests 10 \
-			--log results/ablation_worlds.jsonl --json results/ablation_$$world.json || exit; \
+	for world in ideal lock lid-box repeated-tags prism mixed random-atg half-and-half; do \
+		$(BIN)/atg-fg table1 --world $$world --preset learned --tests 5 --json results/kinds_$$world.json || exit; \
+	done
+	for world in prism mixed; do \
+		$(BIN)/atg-fg table1 --world $$world --preset learned --tests 5 --slip 0.02 --wrong 0.005 \
+			--json results/kinds_$${world}_noisy.json || exit; \
 	done
 	for world in half-and-half random-atg; do \
-		$(BIN)/atg-fg table1 --world $$world --world-option n_successors=1 --tests 10 --preset default \
-			--engine bayes-filter --json results/table1_$${world}_default.json || exit; \
-		$(BIN)/atg-fg table1 --world $$world --world-option n_successors=1 --tests 10 --preset learned \
-			--json results/table1_$${world}_learned.json || exit; \
+		$(BIN)/atg-fg table1 --world $$world --world-option n_successors=1 --tests 3 --preset learned \
+			--json results/kinds_$${world}_sure.json || exit; \
 	done
+	$(BIN)/atg-fg table1 --preset learned --tests 5 --missing 0.1 --json results/kinds_missing.json
+	$(BIN)/atg-fg table1 --preset learned --tests 5 --slip 0.05 --wrong 0.01 --json results/kinds_slipping.json
+	$(BIN)/python benchmarks/kinds_found.py 5
+	$(BIN)/python benchmarks/kinds_found.py 5 0.02 0.005
 	$(BIN)/atg-fg table1 --preset learned --tests 1 --trials 10 --save-memories out
 	$(BIN)/atg-fg memory structure out/memory-0000.json --plot docs/images/structure.png
 	$(BIN)/atg-fg rescore results/robonaut/*/test-0000.jsonl.gz --preset learned --json results/rescore_learned.json

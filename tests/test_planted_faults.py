@@ -169,10 +169,10 @@ FAULTS = [
         "bound += share * table[row, kind] + 1.0",
     ),
     Fault(
-        "plain evidence: nothing is learned within the trial",
+        "plain evidence: no transition is counted within the trial",
         "learning/kind_kernels.py",
-        "if patterns[time] >= 0:",
-        "if patterns[time] >= len(evidence[0]):",
+        "counted_from = patterns[time - 1] if time > 0 else -1",
+        "counted_from = -1",
     ),
     Fault(
         "plain evidence: objects never met count as one",
