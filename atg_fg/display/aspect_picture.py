@@ -97,7 +97,7 @@ def draw_aspect(
         alphabet: Names slots and symbols.
         symbols: What each slot shows; where it is ``None`` a question mark is drawn.
         place: The middle of the aspect.
-        images: Grey image of each symbol, shape [pixels, pixels]; its name is written where there is none.
+        images: Of each symbol, grey of shape [pixels, pixels] or RGB; its name is written where there is none.
         look: How to draw it.
     """
     draw = _draw_cube if alphabet.slots == CUBE_SLOTS else _draw_tiles

@@ -38,7 +38,8 @@ def draw_atg(
 
     Args:
         graph: The graph; 1 to about 24 aspects are readable.
-        symbol_images: Grey image of each symbol, shape [pixels, pixels]; its number is written where there is none.
+        symbol_images: Of each symbol, grey of shape [pixels, pixels] or RGB, such as thumbnails of classes
+            (``AppearanceSense.thumbnails``); its number is written where there is none.
         highlight: Index of an aspect to frame, such as the current one.
         path: Counted transitions to draw strong, such as the way to a goal, while the others are pale.
 

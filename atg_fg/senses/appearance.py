@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any, Final
 
 import numpy as np
@@ -13,6 +13,7 @@ from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import MISSING, Detection, Evidence, FloatArray, IntArray, PatternAlphabet
 from atg_fg.core.sense import Reading, Readings, SensedLook, SensedTrial
 from atg_fg.senses.codebook import Codebook
+from atg_fg.senses.face_features import FaceFeatures, Image
 from atg_fg.senses.feature_space import FeatureSpace
 
 #: A look is taken for the look of a class, or of a new one, only if that is so probable.
@@ -69,6 +70,28 @@ class AppearanceSense:
         belief = self.codebook.posterior(self.space.encode(features))
         best = int(belief.classes.argmax())
         return best if belief.classes[best] >= SURE else None
+
+    def thumbnails(self, crops: Iterable[Image], features: FaceFeatures) -> dict[int, Image]:
+        """Return, for each class that any of the crops is of for sure, the one that is nearest to it.
+
+        ``draw_atg(graph, symbol_images=…)`` draws them in place of the numbers of classes.
+
+        Args:
+            crops: RGB, such as a world's ``crops`` at each look.
+            features: That this sense reads.
+
+        Raises:
+            InvalidInputError: Features of another length than the codebook's, or not finite.
+        """
+        best: dict[int, tuple[float, Image]] = {}
+        for crop in crops:
+            values = features(crop)
+            symbol = self.symbol_of(values)
+            if symbol is not None:
+                density = float(self.codebook.log_densities(self.space.encode(values))[0][symbol])
+                if symbol not in best or density > best[symbol][0]:
+                    best[symbol] = density, crop
+        return {symbol: crop for symbol, (_, crop) in sorted(best.items())}
 
     def check_space(self, space: Any) -> None:
         """Raise ``InvalidInputError`` unless these are observations that the sense can read."""

@@ -9,6 +9,7 @@ import pytest
 from atg_fg.core.errors import InvalidInputError, UnknownNameError
 from atg_fg.core.goals import Goal
 from atg_fg.core.memory import RobotMemory
+from atg_fg.display.atg_picture import draw_atg
 from atg_fg.engines import begin_trial
 from atg_fg.experiments.exploration import explore
 from atg_fg.experiments.table1 import TestPlan, run_test
@@ -142,6 +143,26 @@ def test_a_memory_of_other_features_or_of_none_is_refused(world):
     inference = begin_trial("bayes-filter", memory, preset("default"))
     with pytest.raises(InvalidInputError, match="features 'colours-and-gradients', memory of 'mine:embed'"):
         run_trial(world, inference, RandomPolicy(), 1, np.random.default_rng(0))
+
+
+def test_classes_are_thumbnails_in_pictures_of_atgs(world):
+    memory, features = memory_of(world), world.get_wrapper_attr("features")
+    trials(world, memory, 4)
+    crops, shown = [], {}
+    for seed in range(40):
+        _, info = world.reset(seed=seed)
+        for crop, picture in zip(world.get_wrapper_attr("crops"), info["pattern"], strict=True):
+            crops.append(crop.copy())
+            shown[id(crops[-1])] = picture
+    thumbnails = memory.sense.thumbnails(crops, features)
+    assert 4 <= len(thumbnails) <= memory.sense.codebook.n_classes
+    # A crop stands for the class that it is of, and no two of them show the same picture.
+    assert all(memory.sense.symbol_of(features(crop)) == symbol for symbol, crop in thumbnails.items())
+    assert len({shown[id(crop)] for crop in thumbnails.values()}) == len(thumbnails)
+    figure = draw_atg(memory["object-000"], symbol_images=thumbnails)
+    drawn = [image.get_array() for image in figure.axes[0].get_images()]
+    assert drawn
+    assert all(any(np.array_equal(array, crop) for crop in thumbnails.values()) for array in drawn)
 
 
 def test_boxes_that_differ_in_weight_alone_look_the_same():
