@@ -121,6 +121,7 @@ results-pictures: $(READY)  ## Run the experiments on boxes with pictures (about
 	$(BIN)/atg-fg table1 --world picture-box --preset default --engine bayes-filter --tests 10 \
 		--json results/table1_picture-box_default.json
 	$(BIN)/python benchmarks/appearance.py 10
+	$(BIN)/python benchmarks/weight.py 5
 
 # README's table of methods, and how calibrated each engine is (about a quarter of an hour).
 results-engines: $(READY)  ## Compare and calibrate all inference engines
