@@ -66,7 +66,7 @@ def verdicts(parameters, engine):
     for number in range(40):
         inference = atg.begin_trial(engine, memory, parameters)
         record = run_trial(world, inference, atg.make_policy("entropy"), 8, np.random.default_rng(number))
-        score.add(TrialSummary.of(record), learn_from(record, memory))
+        score.add(TrialSummary.of(record), learn_from(record, memory), memory)
         score.mend(memory)
         rights.append(score.successes - sum(rights))
     return np.array(rights), memory
