@@ -221,15 +221,15 @@ for weight in (False, True):
 options = {"look_alikes": 0.5, "differ_in": "weight", "weight": True}
 felt = atg.make_world("picture-box", n_objects=12, objects_seed=0, **options)
 boxes = felt.unwrapped.boxes
-first, second = next(
-    (a, b) for a in range(12) for b in range(a) if boxes.faces[a] == boxes.faces[b]
-)  # fmt: skip
+first, second = next((a, b) for a in range(12) for b in range(a) if boxes.faces[a] == boxes.faces[b])
 alike = atg.RobotMemory(felt.unwrapped.assumptions, sense=sense_of(felt))
 for number, box in enumerate((first, second)):
     inference = atg.begin_trial("bayes-filter", alike, parameters)
     rng = np.random.default_rng(number)
     record = run_trial(felt, inference, atg.make_policy("entropy"), 10, rng, reset_options={"object": box})
     learn_from(record, alike)
+
+# %%
 inference = atg.begin_trial("bayes-filter", alike, parameters)
 record = run_trial(
     felt, inference, atg.make_policy("entropy"), 3, np.random.default_rng(9), reset_options={"object": first}
