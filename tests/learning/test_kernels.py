@@ -248,7 +248,7 @@ def test_probability_of_novelty_is_calibrated():
         chain.admit(task)
         chain.scatter(rng)
         chain.log_joint(task)
-        votes = [chain.sweep(task, rng).last[-1] for _ in range(12)]
+        votes = [chain.sweep(task, rng)[-1] for _ in range(12)]
         said.append(np.mean(votes[4:]))
         was.append(owners[2] not in owners[:2])
     said, was = np.array(said), np.array(was, dtype=float)
