@@ -97,10 +97,10 @@ docs: $(READY)  ## Build the documentation site in out/docs; a warning is an err
 	$(BIN)/sphinx-build -W --keep-going -q -b html docs out/docs
 
 # The other scripts in benchmarks/ are about success, not time, and are run by themselves: docs/performance.md.
-bench: $(READY)  ## (AGAINST=revision) Time engines and other libraries, and the simulated robot, side by side; fill in docs/performance.md
+bench: $(READY)  ## (AGAINST=revision, ROUNDS=n) Time engines and other libraries, and the simulated robot, side by side; fill in docs/performance.md
 	$(BIN)/python -m pip install --quiet --editable '.[bench]'
 	mkdir -p results
-	$(BIN)/atg-fg bench $(if $(AGAINST),--against $(AGAINST)) --json results/bench.json --markdown docs/performance.md
+	$(BIN)/atg-fg bench $(if $(AGAINST),--against $(AGAINST)) $(if $(ROUNDS),--rounds $(ROUNDS)) --json results/bench.json --markdown docs/performance.md
 	$(BIN)/python benchmarks/simulation.py
 
 # One command a file: README's results tables and figures are these.

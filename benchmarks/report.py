@@ -90,6 +90,7 @@ def run(
         "equal_matches": equal,
         "peak_memory": peak,
         "against": compared,
+        "worker_start": table1.start_of_workers(plan.table1_rounds, clock),
         "table1": table1.measure(plan.tests, plan.table1_trials, plan.table1_rounds, clock),
     }
     return {**document, "targets": [target.verdict(document) for target in TARGETS]}
