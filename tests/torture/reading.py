@@ -34,7 +34,7 @@ from atg_fg.core.assumptions import arcube_assumptions
 from atg_fg.core.errors import AtgError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
-from atg_fg.core.recordings import Recording
+from atg_fg.core.recordings import RecordedLook, Recording
 from atg_fg.experiments.ablation import AblationLog, Cell
 from atg_fg.experiments.goals import GoalRunFile
 from atg_fg.experiments.recorded_trials import recognise
@@ -284,15 +284,13 @@ def _written_again(recording: Recording, path: Path) -> None:
 
 
 def _said(recording: Recording) -> list[Any]:
-    """What a recording says, in whatever form: not to state a confidence is to state none of each."""
-    return [
-        trial._replace(
-            looks=tuple(
-                look._replace(confidences=look.confidences if any(look.confidences) else ()) for look in trial.looks
-            )
-        )
-        for trial in recording.trials
-    ]
+    """What a recording says in whatever form: no confidence is none of each, and a label of weight 0 is none."""
+    return [trial._replace(looks=tuple(map(_plain_look, trial.looks))) for trial in recording.trials]
+
+
+def _plain_look(look: RecordedLook) -> RecordedLook:
+    weights = tuple(slot and {label: weight for label, weight in slot.items() if weight} for slot in look.weights)
+    return look._replace(confidences=look.confidences if any(look.confidences) else (), weights=weights)
 
 
 def _read_bag(path: Path) -> None:
