@@ -48,7 +48,7 @@ def test_every_link_and_picture_is_there():
         ("`--preset default`", "table1_default"),
         ("`--preset learned`", "table1_learned"),
         ("the simulated robot", "table1_robonaut_nominal_default"),
-    ("robonaut-picture-box", "table1_robonaut-picture-box_learned"),
+        ("robonaut-picture-box", "table1_robonaut-picture-box_learned"),
     ],
 )
 def test_its_results_are_those_in_the_files_that_make_results_leaves(words, file):

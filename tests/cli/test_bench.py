@@ -20,6 +20,7 @@ def page(folder):
     return path
 
 
+@pytest.mark.slow
 def test_a_quick_run_measures_everything_and_writes_it(run, folder, page):
     status, output, _ = run("bench", "--quick", "--json", folder / "bench.json", "--markdown", page)
     assert status == 0

@@ -67,6 +67,7 @@ def test_what_is_there_works():
     assert not findings["pybullet"].required
 
 
+@pytest.mark.slow
 def test_each_way_to_fail_is_told_apart(planted):
     found = {each.subject: (each.status, each.detail) for each in diagnose()}
     assert found["planted sound"] == ("works", "all is well")

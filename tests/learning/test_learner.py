@@ -68,6 +68,7 @@ def test_of_half_and_half_each_object_is_told_apart():
     assert learner.rates.share == pytest.approx(0.5, abs=0.15)
 
 
+@pytest.mark.slow
 def test_prisms_are_learned_with_their_two_modes():
     learner = learned(prisms(13), range(13))
     best = learner.believed(["0", "12"])[0]

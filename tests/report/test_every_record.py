@@ -16,6 +16,8 @@ from atg_fg.worlds.registry import ARCUBE_WORLDS, WORLDS
 from tests.cli.conftest import run as run  # a fixture
 
 SIMULATED = ("rendered", "robonaut", "robonaut-picture-box")
+#: Worlds whose looks are pictures.
+LONG = ("picture-box", "meshes")
 N_TRIALS = 2
 
 
@@ -27,7 +29,10 @@ def cases():
         for world in WORLDS:
             # The simulator needs its extra, and minutes for what an ideal world shows at once: one preset is enough.
             if world not in SIMULATED:
-                yield pytest.param(world, name, quick, id=f"{world}-{name}-{quick}")
+                # The worlds differ in what they write, the presets in how it is judged: the rest of the grid is for CI.
+                one_of_many = (world != "ideal" and name != "default") or world in LONG
+                marks = [pytest.mark.slow] if one_of_many else []
+                yield pytest.param(world, name, quick, id=f"{world}-{name}-{quick}", marks=marks)
         for engine in able:
             if engine != quick:
                 yield pytest.param("ideal", name, engine, id=f"ideal-{name}-{engine}")

@@ -62,7 +62,7 @@ def test_a_test_in_a_database_is_told_as_its_log_is(test_log, tmp_path):
     assert read_report(tmp_path / "records.db").trials == read_report(test_log).trials
 
 
-def test_trials_that_a_database_was_taught_show_what_they_were_learned_into(trial, tmp_path):
+def test_trials_of_a_database_that_was_not_empty_show_what_each_look_told(trial, tmp_path):
     memory, run = trial
     path = tmp_path / "robot.db"
     with open_memory(path, memory.assumptions) as kept:
@@ -73,7 +73,11 @@ def test_trials_that_a_database_was_taught_show_what_they_were_learned_into(tria
     (page,) = report.trials
     assert report.parameters == {"seed": "5", "preset": "default"}
     assert page.verdict == "object-000"
-    assert {page.graphs[look.graph].name for look in page.looks} == {"object-000"}
+    shown = [page.graphs[look.graph].name for look in page.looks]
+    believed = [step.belief.objects[0] > step.belief.unseen for step in run.steps]
+    assert shown == ["object-000" if known else "a new object" for known in believed]
+    assert not believed[0]
+    assert believed[-1]
     assert [look.entropy for look in page.looks] == [step.belief.entropy for step in run.steps]
     assert [value for _, value in page.looks[0].expected] == run.steps[0].expected_entropies.tolist()
 

@@ -7,6 +7,8 @@ import subprocess
 import sys
 from pathlib import Path
 
+import pytest
+
 TRIAL = """
 import sys
 from atg_fg.inference.kernels import compilation
@@ -36,6 +38,7 @@ def printed(code: str, **environment: str) -> list[str]:
     return done.stdout.split()
 
 
+@pytest.mark.slow
 def test_the_first_process_tells_once_that_it_compiles_and_the_second_compiles_nothing(tmp_path: Path) -> None:
     assert printed(TRIAL, NUMBA_CACHE_DIR=str(tmp_path)) == ["compiling", "True"]
     assert printed(TRIAL, NUMBA_CACHE_DIR=str(tmp_path)) == ["True"]

@@ -87,6 +87,7 @@ def test_a_quarter_turn_of_a_crop_has_the_same_features(world):
     assert np.linalg.norm(turned - features(crop)) < 0.1 * np.linalg.norm(other - features(crop))
 
 
+@pytest.mark.slow
 def test_classes_found_without_labels_are_the_pictures(world):
     memory = memory_of(world)
     records = trials(world, memory, 12)
