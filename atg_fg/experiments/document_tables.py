@@ -69,7 +69,9 @@ def action_rates(document: Mapping[str, Any]) -> tuple[str, dict[str, Mapping[st
 
 
 def detection_rates(document: Mapping[str, Any]) -> tuple[str, dict[str, Mapping[str, Any]]]:
-    """Return the title, and the rates by slot, of a result of the robot's reliability."""
+    """Return the title, and the rates by slot, of a result of the robot's reliability; of boxes, how many it found."""
+    if "boxes" in document:
+        return "Boxes found, of all looks", {"all": document["boxes"]["found"]}
     return "Slots detected, of all looks", document["detection"]
 
 

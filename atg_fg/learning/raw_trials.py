@@ -205,3 +205,19 @@ def _likelihoods(trials: Sequence[RawTrial], arrays: TrialArrays, n_symbols: int
                 if weights is not None:
                     result[number, look, slot] = np.array(weights) * (n_symbols / sum(weights))
     return result
+
+
+class Reassignment(NamedTuple):
+    """A raw trial that was given to another ATG.
+
+    Attributes:
+        after: Number of raw trials by which this came to light.
+        trial: Number of the trial.
+        old: Name of the ATG that it was of.
+        new: Name of the one that it is of from then on.
+    """
+
+    after: int
+    trial: int
+    old: str
+    new: str

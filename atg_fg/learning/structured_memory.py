@@ -7,7 +7,7 @@ import itertools
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
-from typing import Final, NamedTuple
+from typing import Final
 
 import numpy as np
 
@@ -26,33 +26,15 @@ from atg_fg.core.transactions import one_transaction
 from atg_fg.learning.evidence_learner import EvidenceLearner, SavedEvidence
 from atg_fg.learning.learner import StructureLearner
 from atg_fg.learning.milestones import next_milestone
-from atg_fg.learning.raw_trials import RawTrial
+from atg_fg.learning.raw_trials import RawTrial, Reassignment
 
 #: Nats of evidence, and least number of trials, by which one model of looks outdoes the other so that it rests.
 OUTDONE: Final = 20.0
 FIRST_TRIALS: Final = 8
 #: Trials that are always learned from one by one: what is learned from the first ones goes through many hands.
 FIRST_ALONE: Final = 48
-
-
 #: Gain of a model whose structure is mistaken.
 MISTAKEN: Final = -2 * OUTDONE
-
-
-class Reassignment(NamedTuple):
-    """A raw trial that was given to another ATG.
-
-    Attributes:
-        after: Number of raw trials by which this came to light.
-        trial: Number of the trial.
-        old: Name of the ATG that it was of.
-        new: Name of the one that it is of from then on.
-    """
-
-    after: int
-    trial: int
-    old: str
-    new: str
 
 
 class StructuredMemory(RobotMemory):

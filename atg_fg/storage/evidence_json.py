@@ -13,9 +13,9 @@ from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import FloatArray
 from atg_fg.learning.detector_noise import MAX_BINS, DetectorNoise
 from atg_fg.learning.evidence_learner import MOST_RIVALS, SavedEvidence
-from atg_fg.learning.raw_trials import RawTrial
+from atg_fg.learning.raw_trials import RawTrial, Reassignment
 from atg_fg.learning.saved_chain import SavedChain
-from atg_fg.learning.structured_memory import Reassignment, StructuredMemory
+from atg_fg.learning.structured_memory import StructuredMemory
 from atg_fg.storage.checked_json import read_list, read_object
 from atg_fg.storage.structure_json import read_structure, write_structure
 
