@@ -72,7 +72,13 @@ FIGURES: Final = (
         3,
         1,
     ),
-    Figure("Figure 3 with one test a point, two processes", ("figure3", {"n_trials": 100}), "seconds", 4, 2),
+    Figure(
+        "Figure 3 with four tests a point, two processes",
+        ("figure3", {"n_trials": 100, "n_tests": 4}),
+        "seconds",
+        4,
+        2,
+    ),
 )
 #: A look at whether it runs.
 QUICK: Final = (

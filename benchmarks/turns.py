@@ -42,12 +42,13 @@ def test(engine: str, parameters: str, n_trials: int) -> dict[str, list[float]]:
     return _seconds([_tests().TestPlan(engine=engine, n_trials=n_trials, parameters=preset)], 1)
 
 
-def figure3(n_trials: int) -> dict[str, list[float]]:
-    """Return the seconds of one test at each point of Figure 3, by two processes, their start included."""
+def figure3(n_trials: int, n_tests: int) -> dict[str, list[float]]:
+    """Return the seconds of so many tests at each point of Figure 3, by two processes, their start included."""
     plans = [
         _tests().TestPlan(engine="bayes-filter", policy=policy, n_actions=n_actions, n_trials=n_trials)
         for policy in ("entropy", "random")
-        for n_actions in POINTS
+        for n_actions in reversed(POINTS)  # the longest first, as the command has them
+        for _ in range(n_tests)
     ]
     return _seconds(plans, 2)
 

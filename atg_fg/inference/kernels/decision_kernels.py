@@ -94,8 +94,10 @@ def next_looks(
     n_known, pattern, begins, edges, _, edge_probability = tables
     n_aspects, n_patterns, _, delta = constants
     n_actions, observed = len(terms), 1.0 - delta
-    more, everywhere = np.empty(n_actions), np.zeros(n_actions)
-    added = np.zeros((n_patterns, n_actions))
+    # Four at a time are added in one operation.
+    padded = (n_actions + 3) // 4 * 4
+    more, everywhere = np.zeros(padded), np.zeros(n_actions)
+    added = np.zeros((n_patterns, padded))
     reached, n_reached = np.empty((n_actions, _BLOCK)), np.zeros(n_actions, np.int64)
     others, factors, n_others = np.empty((n_actions, _BLOCK)), np.empty((n_actions, _BLOCK)), 0
     terms[:] = 0.0
@@ -145,8 +147,9 @@ def next_looks(
         n_others += 2
         for state in range(1, n_own + 1):
             known = pattern[hypothesis, state]
-            for action in range(n_actions):
-                added[known, action] += more[action]
+            for four in range(0, padded, 4):
+                for action in range(four, four + 4):
+                    added[known, action] += more[action]
     for action in range(n_actions):
         for each in range(n_patterns):
             predictive[action, each] = added[each, action] + everywhere[action]
