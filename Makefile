@@ -34,8 +34,9 @@ print(*(each for each in project['dependencies'] + extras['sim'] + extras['viz']
 endef
 export needs_of_demo
 
-# The sample models in PyBullet's wheel are 140 MB, and nothing here uses them.
-without_samples = rm -rf $(VENV)/lib/python3*/site-packages/pybullet_data
+# The sample models in PyBullet's wheel are 140 MB; of these only the things of odd shapes are used (28 MB).
+without_samples = find $(VENV)/lib -mindepth 4 -maxdepth 4 -path '*/site-packages/pybullet_data/*' \
+	! -name random_urdfs ! -name __init__.py -exec rm -rf {} +
 
 # --group needs pip 25.1.
 $(READY): pyproject.toml

@@ -15,6 +15,7 @@ OUTPUTS = {
     "recognise": {"memory", "report", "json_file"},
     "recordings check": {"json_file"},
     "recordings convert": {"output"},
+    "recordings export": set(),
     "recordings simulate": {"output"},
     "ablation": {"json_file", "log", "plot"},
     "bench": {"json_file", "markdown"},

@@ -191,6 +191,6 @@ def test_a_memory_that_learns_structure_says_what_it_believes(monkeypatch):
     memory = StructuredMemory(arcube_assumptions())
     assert shown(memory)[-1].endswith("; 0 raw trials; structures believed in: none")
     structure = SharedStructure(2, ((1, 0),) * 3)
-    believed = [BelievedStructure(structure, weight, np.empty(0), np.empty(0), 1.0, 0) for weight in (0.9, 0.05)]
+    believed = [BelievedStructure(structure, weight, np.empty(0), np.empty(0), 1.0) for weight in (0.9, 0.05)]
     monkeypatch.setattr(memory.learner, "believed", lambda names: believed)
     assert shown(memory)[-1].endswith("; 0 raw trials; structures believed in: with weights 0.90, 0.05")

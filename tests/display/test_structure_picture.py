@@ -19,7 +19,7 @@ from tests.learning.worlds import ARCUBES, BOX, CUBE, RING, RING_WORLD, cubes, t
 def memory():
     rng = np.random.default_rng(1)
     result = StructuredMemory(ARCUBES)
-    for cube in cubes(3):
+    for cube in cubes(5):
         add(result, trial_of(cube, 9, rng))
     return result
 
