@@ -83,7 +83,7 @@ def test_things_are_recognised_by_their_views_and_weights(world):
     memory = RobotMemory(assumptions_of(world, 4), sense=sense_of(world))
     verdicts = []
     for number in range(12):
-        rng = np.random.default_rng(number)
+        rng = np.random.default_rng(100 + number)
         inference = begin_trial("bayes-filter", memory, preset("default"))
         record = run_trial(world, inference, RandomPolicy(), 8, rng, reset_options={"object": number % 4})
         verdicts.append(record.matched)
