@@ -23,6 +23,11 @@ def whole_number(value: Any, place: str, least: int = 0, most: int | None = None
     return int(value)
 
 
+def is_number(value: Any) -> bool:
+    """Whether ``value`` is a number of Python's or NumPy's, and no truth value."""
+    return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+
+
 def number(
     value: Any,
     place: str,
@@ -42,9 +47,8 @@ def number(
         below: Upper bound that is no longer allowed itself.
         slack: How far rounding may have carried it past a bound.
     """
-    is_number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
     try:
-        found = float(value) if is_number else math.nan
+        found = float(value) if is_number(value) else math.nan
     except OverflowError:  # a whole number too large for a float
         found = math.inf
     if not math.isfinite(found) or not least - slack <= found <= most + slack or found >= below:

@@ -17,7 +17,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from atg_fg.core.checks import brief, plain_text
+from atg_fg.core.checks import brief, is_number, plain_text
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import FloatArray, Measured
 
@@ -92,8 +92,7 @@ class ObjectSense:
         for field in ("spread", "error", "worth"):
             value = getattr(self, field)
             most = math.inf if field == "worth" else GREATEST_READING
-            is_number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
-            if not is_number or not 1e-9 <= value <= most:
+            if not is_number(value) or not 1e-9 <= value <= most:
                 raise InvalidInputError(f"{place}: {field} {brief(value)}; expected a number of at least 1e-09")
             object.__setattr__(self, field, float(value))
         if self.spread > MOST_RATIO * self.error:
@@ -104,10 +103,9 @@ class ObjectSense:
 
     def check(self, value: Any, place: str) -> float:
         """Return a reading as a float, or raise ``InvalidInputError`` naming ``place`` and the unit."""
-        is_number = isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
         least = 0.0 if self.relative else -GREATEST_READING
         # A NaN is in no range.
-        if not is_number or not least <= value <= GREATEST_READING or (self.relative and not value > 0):
+        if not is_number(value) or not least <= value <= GREATEST_READING or (self.relative and not value > 0):
             unit = f", in {self.unit}" if self.unit else ""
             bounds = "above 0" if self.relative else "that is finite"
             raise InvalidInputError(f"{place}: {brief(value)}; expected a number {bounds}{unit}")

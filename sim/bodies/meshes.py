@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-import pybullet_data
 
 from atg_fg.core.checks import whole_number
+from atg_fg.core.errors import MissingDependencyError
 from atg_fg.core.patterns import FloatArray
 
 #: Meshes that there are; the last ones calibrate features, and are in no world.
@@ -49,6 +49,7 @@ def make_meshes(n: int, seed: int) -> list[Mesh]:
 
     Raises:
         InvalidInputError: A number out of range.
+        MissingDependencyError: The meshes are not installed.
     """
     most = N_MESHES - N_FOR_CALIBRATION
     whole_number(n, "n_objects", 1, most)
@@ -57,12 +58,12 @@ def make_meshes(n: int, seed: int) -> list[Mesh]:
 
 
 def calibration_meshes(n: int, rng: np.random.Generator) -> list[Mesh]:
-    """Return things that are in no world."""
+    """Return ``n`` things that are in no world, with sizes and weights drawn by ``rng``."""
     return [_mesh(N_MESHES - 1 - number, rng) for number in range(n)]
 
 
 def _mesh(number: int, rng: np.random.Generator) -> Mesh:
-    path = Path(pybullet_data.getDataPath()) / "random_urdfs" / f"{number:03d}" / f"{number:03d}.obj"
+    path = _folder() / f"{number:03d}" / f"{number:03d}.obj"
     points = _points_of(path)
     middle = (points.max(axis=0) + points.min(axis=0)) / 2
     scale = _EXTENT * float(rng.uniform(_LEAST_SHARE, 1.0)) / float(np.ptp(points, axis=0).max())
@@ -70,6 +71,22 @@ def _mesh(number: int, rng: np.random.Generator) -> Mesh:
     volume = float(np.ptp(vertices, axis=0).prod())
     weight = TYPICAL_WEIGHT * volume / _TYPICAL_VOLUME * float(np.exp(DENSITY_SPREAD * rng.standard_normal()))
     return Mesh(path, scale, middle, vertices, weight)
+
+
+def _folder() -> Path:
+    """Return the folder of the meshes; set-ups without PyBullet's sample models lack it."""
+    try:
+        from pybullet_data import getDataPath
+    except ImportError:
+        folder = None
+    else:
+        folder = Path(getDataPath()) / "random_urdfs"
+    if folder is None or not folder.is_dir():
+        raise MissingDependencyError(
+            "world 'meshes': the random meshes of PyBullet are not installed; expected its sample models, as they come "
+            "with it: pip install --force-reinstall --no-deps pybullet"
+        )
+    return folder
 
 
 @lru_cache(maxsize=256)

@@ -69,6 +69,11 @@ class Imaging:
         return Light((x + change[0], y + change[1], z), Light().ambient, Light().diffuse * (1 + 0.5 * change[2]))
 
 
+def in_usual_light(frame: NDArray[np.uint8], lightness: float) -> NDArray[np.uint8]:
+    """Return a frame, RGB, as it would be in usual light, beside which it is so light now."""
+    return np.clip(np.round(frame / np.float32(lightness)), 0, 255).astype(np.uint8)
+
+
 def at_least_zero(name: str, value: float) -> float:
     """Return ``value`` if it is a finite number of at least zero, else raise ``InvalidInputError``."""
     if not 0 <= value < np.inf:

@@ -17,7 +17,8 @@ from sim.bodies.meshes import Mesh
 from sim.bodies.tables import TABLE_TOP, WOOD
 from sim.vision.box_pose import lightness, turned
 from sim.vision.camera import Camera, Light
-from sim.vision.image_noise import Imaging, at_least_zero
+from sim.vision.image_noise import in_usual_light
+from sim.vision.object_camera import ObjectCamera
 
 _GREY: Final = (0.55, 0.55, 0.60, 1.0)
 #: What differs from the empty table by more, in the three colours together, is the thing; grey levels.
@@ -27,32 +28,16 @@ _LEAST_PART: Final = 0.004  # of the image
 _SIDE: Final = 0.85
 
 
-class MeshCamera:
+class MeshCamera(ObjectCamera):
     """Renders a thing alone and lays it over a picture of the table, as light as the lamp is at this look.
 
     Args:
         camera: Where it stands.
-        position_jitter: How far at most each look finds the thing off its place in x and y, m.
-        yaw_jitter: How far at most it is turned about the vertical, degrees.
-        light_jitter: How much the light changes, 0 (not at all) to 1.
-        image_noise: Standard deviation of noise on each grey level (0 to 255).
-        blur: Standard deviation of a Gaussian blur, pixels.
+        jitter: As for ``ObjectCamera``.
     """
 
-    def __init__(
-        self,
-        camera: Camera,
-        *,
-        position_jitter: float,
-        yaw_jitter: float,
-        light_jitter: float,
-        image_noise: float,
-        blur: float,
-    ) -> None:
-        self.camera = camera
-        self.position_jitter = at_least_zero("position_jitter", position_jitter)
-        self.yaw_jitter = at_least_zero("yaw_jitter", yaw_jitter)
-        self.imaging = Imaging(light_jitter, image_noise, blur)
+    def __init__(self, camera: Camera, **jitter: float) -> None:
+        super().__init__(camera, **jitter)
         self._client = pybullet.connect(pybullet.DIRECT)
         # A camera that nobody closes must not keep its client until the process ends.
         self._disconnect = weakref.finalize(self, pybullet.disconnect, physicsClientId=self._client)
@@ -60,8 +45,8 @@ class MeshCamera:
         self._body = -1
         width, height = camera.image_size
         wood = 255.0 * np.array(WOOD[:3], dtype=np.float32) * np.float32(Light().on_top)
-        #: The table without a thing in usual light, RGB, shape [height, width, 3]; it is wider than the image.
-        self.empty: NDArray[np.float32] = np.tile(wood, (height, width, 1))
+        # The table is wider than the image.
+        self.empty = np.tile(wood, (height, width, 1))
 
     def close(self) -> None:
         """Leave PyBullet; the camera cannot be used any more."""
@@ -113,8 +98,7 @@ class MeshCamera:
             InvalidInputError: A frame of another size or type.
         """
         check_image(frame, "frame", self.camera.image_size)
-        light = lightness(frame, self.empty)
-        usual = np.clip(np.round(frame / np.float32(light)), 0, 255).astype(np.uint8)
+        usual = in_usual_light(frame, lightness(frame, self.empty))
         side = round(_SIDE * frame.shape[0])
         across, down = self._middle(usual)
         moved = np.array([[1.0, 0.0, side / 2 - across], [0.0, 1.0, side / 2 - down]])

@@ -16,12 +16,13 @@ from atg_fg.worlds.arcube import FACE_NORMALS, FRONT, TOP
 from sim.bodies.cube import CUBE_CENTRE, CUBE_SIZE, face_corners
 from sim.vision.box_pose import find_box, lightness, turned
 from sim.vision.camera import Camera, Light
-from sim.vision.image_noise import at_least_zero
+from sim.vision.image_noise import in_usual_light
+from sim.vision.object_camera import ObjectCamera
 
 _TABLE, _FLOOR = (104, 112, 120), (204, 209, 214)
 
 
-class PictureBoxCamera:
+class PictureBoxCamera(ObjectCamera):
     """Draws a box with pictures on a table as a camera sees it.
 
     A box is convex, so what it shows are its faces that are turned towards the camera, each a planar picture in
@@ -29,30 +30,11 @@ class PictureBoxCamera:
 
     Args:
         camera: Where it stands.
-        position_jitter: How far at most each look finds the box off its place in x and y, m.
-        yaw_jitter: How far at most it is turned about the vertical, degrees.
-        light_jitter: How much the light changes, 0 (not at all) to 1.
-        image_noise: Standard deviation of noise on each grey level (0 to 255).
-        blur: Standard deviation of a Gaussian blur, pixels.
+        jitter: As for ``ObjectCamera``.
     """
 
-    def __init__(
-        self,
-        camera: Camera,
-        *,
-        position_jitter: float,
-        yaw_jitter: float,
-        light_jitter: float,
-        image_noise: float,
-        blur: float,
-    ) -> None:
-        self.camera = camera
-        self.position_jitter = at_least_zero("position_jitter", position_jitter)
-        self.yaw_jitter = at_least_zero("yaw_jitter", yaw_jitter)
-        self.light_jitter = at_least_zero("light_jitter", light_jitter)
-        self.image_noise = at_least_zero("image_noise", image_noise)
-        self.blur = at_least_zero("blur", blur)
-        #: The table without a box in usual light, RGB, shape [height, width, 3].
+    def __init__(self, camera: Camera, **jitter: float) -> None:
+        super().__init__(camera, **jitter)
         self.empty = self._draw_table()
 
     def _draw_table(self) -> NDArray[np.float32]:
@@ -76,7 +58,7 @@ class PictureBoxCamera:
         """
         offset = np.append(rng.uniform(-1, 1, 2) * self.position_jitter, 0.0)
         turn = turned(float(np.radians(rng.uniform(-1, 1) * self.yaw_jitter)))
-        change = self.light_jitter * rng.uniform(-1, 1, 3)
+        change = self.imaging.light_jitter * rng.uniform(-1, 1, 3)
         lamp = np.add(Light().direction, (change[0], change[1], 0.0))
         lamp /= np.linalg.norm(lamp)
         lightness = 1.0 + 0.5 * change[2]
@@ -96,19 +78,16 @@ class PictureBoxCamera:
             inside = np.zeros(size[::-1], dtype=np.uint8)
             cv2.fillConvexPoly(inside, np.round(corners).astype(np.int32), 1)
             cv2.copyTo(drawn, inside, frame)
-        if self.blur:
-            frame = cv2.GaussianBlur(frame, (0, 0), self.blur)
-        if self.image_noise:
-            frame = frame + rng.normal(0.0, self.image_noise, (*frame.shape[:2], 1)).astype(np.float32)
+        # Noise comes before rounding here, so that this is not ``Imaging.developed``.
+        if self.imaging.blur:
+            frame = cv2.GaussianBlur(frame, (0, 0), self.imaging.blur)
+        if self.imaging.image_noise:
+            frame = frame + rng.normal(0.0, self.imaging.image_noise, (*frame.shape[:2], 1)).astype(np.float32)
         return np.clip(np.round(frame), 0, 255).astype(np.uint8)
 
     def outlined(self, frame: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Return a copy of a frame in which the faces are outlined that are taken for those in front and on top."""
-        drawn = frame.copy()
-        for slot, corners in zip(("front", "top"), self.faces(frame), strict=True):
-            colour = SLOT_COLOURS[slot]
-            cv2.polylines(drawn, [np.round(corners).astype(np.int32)], True, colour, 2, cv2.LINE_AA)
-        return drawn
+        return outlined(frame, self.faces(frame))
 
     def faces(self, frame: NDArray[np.uint8]) -> list[FloatArray]:
         """Return the corners of what is in front and on top, clockwise, each of shape [4, 2], pixels.
@@ -123,7 +102,7 @@ class PictureBoxCamera:
         pose = find_box(frame, self.empty, self.camera.project)
         x, y, yaw = np.zeros(3) if pose is None else pose
         centre = np.add(CUBE_CENTRE, (x, y, 0.0))
-        return [self.camera.project(face_corners(place, turned(float(yaw)), centre)) for place in (FRONT, TOP)]
+        return shown_faces(self.camera, float(yaw), centre)
 
     def crops(self, frame: NDArray[np.uint8]) -> NDArray[np.uint8]:
         """Return what is in front and on top, as if seen from straight ahead, shape [2, side, side, 3].
@@ -133,6 +112,25 @@ class PictureBoxCamera:
         Raises:
             InvalidInputError: A frame of another size or type.
         """
-        faces, light = self.faces(frame), lightness(frame, self.empty)
-        usual = np.clip(np.round(frame / np.float32(light)), 0, 255).astype(np.uint8)
+        faces = self.faces(frame)
+        usual = in_usual_light(frame, lightness(frame, self.empty))
         return np.array([rectified(usual, face) for face in faces])
+
+
+def shown_faces(camera: Camera, yaw: float, centre: FloatArray) -> list[FloatArray]:
+    """Return the corners of what is in front and on top of a box, clockwise, each of shape [4, 2], pixels.
+
+    Args:
+        camera: What sees it.
+        yaw: How far the box is turned about the vertical, rad.
+        centre: Of the box, shape [3], m.
+    """
+    return [camera.project(face_corners(place, turned(yaw), centre)) for place in (FRONT, TOP)]
+
+
+def outlined(frame: NDArray[np.uint8], faces: Sequence[FloatArray]) -> NDArray[np.uint8]:
+    """Return a copy of an RGB frame in which faces, as ``shown_faces`` returns them, are outlined; they may be none."""
+    drawn = frame.copy()
+    for slot, corners in zip(("front", "top"), faces, strict=False):
+        cv2.polylines(drawn, [np.round(corners).astype(np.int32)], True, SLOT_COLOURS[slot], 2, cv2.LINE_AA)
+    return drawn

@@ -9,7 +9,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.object_sense import ObjectSense
 from atg_fg.core.patterns import FloatArray, PatternAlphabet
 from atg_fg.senses.face_features import VIEW, VIEW_FEATURES, face_features
@@ -18,8 +17,7 @@ from atg_fg.worlds.arcube import ACTION_SOURCES, ORIENTATIONS, rotation_of
 from sim.bodies.meshes import DENSITY_SPREAD, TYPICAL_WEIGHT, calibration_meshes, make_meshes
 from sim.vision.camera import Camera
 from sim.vision.mesh_camera import MeshCamera
-from sim.worlds.appearance_world import AppearanceWorld
-from sim.worlds.picture_box_world import USUAL_JITTER
+from sim.worlds.kinematic_world import KinematicWorld
 from sim.worlds.rendered_world import checked_size
 
 #: Numbers that classes of appearance can have: each way in which a thing can lie looks otherwise.
@@ -32,11 +30,10 @@ _WEIGHT_SPREAD: Final = float(np.hypot(DENSITY_SPREAD, 0.75))
 _SIZE: Final = (160, 120)
 
 
-class MeshesWorld(AppearanceWorld):
+class MeshesWorld(KinematicWorld):
     """One of many things of one grey that three actions turn by quarter turns: flip, left, right.
 
-    A thing has no faces: what is seen is one slot, ``view``. To turn a thing it is lifted, and its weight may be felt
-    then.
+    A thing has no faces: what is seen is one slot, ``view``.
 
     Args:
         n_objects: How many things there are, at most 900.
@@ -47,23 +44,18 @@ class MeshesWorld(AppearanceWorld):
         slip: Probability that an action fails and the thing stays as it is.
         missing: Probability that nothing is seen.
         image_size: (width, height) of the frame, pixels.
-        position_jitter: How far at most each look finds the thing off its place in x and y, m.
-        yaw_jitter: How far at most it is turned about the vertical, degrees.
-        light_jitter: How much the light changes from look to look, 0 (not at all) to 1.
-        image_noise: Standard deviation of noise on each grey level (0 to 255).
-        blur: Standard deviation of a Gaussian blur, pixels.
-        render_mode: ``"rgb_array"`` for the camera frame, ``"detections"`` for the frame with what was cut out of it
-            beside it, or ``None``.
+        render_mode: As for ``KinematicWorld``.
+        jitter: ``position_jitter``, ``yaw_jitter``, ``light_jitter``, ``image_noise`` and ``blur`` of ``ObjectCamera``.
 
     Attributes:
         meshes: The things.
-        frame: The last camera frame, RGB, shape [height, width, 3].
 
     Raises:
         InvalidInputError: An option out of its range.
+        MissingDependencyError: The meshes are not installed.
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array", "detections"], "render_fps": 1}  # noqa: RUF012
+    camera: MeshCamera
 
     def __init__(
         self,
@@ -76,62 +68,37 @@ class MeshesWorld(AppearanceWorld):
         slip: float = 0.0,
         missing: float = 0.0,
         image_size: tuple[int, int] = _SIZE,
-        position_jitter: float = USUAL_JITTER["position_jitter"],
-        yaw_jitter: float = USUAL_JITTER["yaw_jitter"],
-        light_jitter: float = USUAL_JITTER["light_jitter"],
-        image_noise: float = USUAL_JITTER["image_noise"],
-        blur: float = USUAL_JITTER["blur"],
         render_mode: str | None = None,
+        **jitter: float,
     ) -> None:
         self.meshes = make_meshes(n_objects, objects_seed)
-        if not isinstance(weight, bool):
-            raise InvalidInputError(f"weight: {weight!r}; expected true or false")
         actions = tuple(ACTION_SOURCES)
-        sense = ObjectSense("weight", TYPICAL_WEIGHT, _WEIGHT_SPREAD, weight_error, unit="kg", revealed_by=actions)
-        told: dict[str, Any] = {"features": features, "side": VIEW, "object_senses": (sense,) if weight else ()}
-        alphabet = PatternAlphabet(("view",), MOST_CLASSES)
-        super().__init__(n_objects, alphabet, render_mode=render_mode, slip=slip, missing=missing, **told)
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise unknown_name("render mode", render_mode, self.metadata["render_modes"])
-        self.camera = MeshCamera(
-            Camera(image_size=checked_size(image_size)),
-            position_jitter=position_jitter,
-            yaw_jitter=yaw_jitter,
-            light_jitter=light_jitter,
-            image_noise=image_noise,
-            blur=blur,
+        super().__init__(
+            n_objects,
+            PatternAlphabet(("view",), MOST_CLASSES),
+            features=features,
+            side=VIEW,
+            weight=weight,
+            weight_sense=ObjectSense(
+                "weight", TYPICAL_WEIGHT, _WEIGHT_SPREAD, weight_error, unit="kg", revealed_by=actions
+            ),
+            slip=slip,
+            missing=missing,
+            camera=MeshCamera(Camera(image_size=checked_size(image_size)), **jitter),
+            render_mode=render_mode,
         )
-        width, height = self.camera.camera.image_size
-        self.frame: NDArray[np.uint8] = np.zeros((height, width, 3), dtype=np.uint8)
 
     def feature_space(self) -> FeatureSpace:
         """Return the space of features, calibrated on things that are in no world."""
         return calibrated_space(self.features_name)
-
-    def close(self) -> None:
-        """Leave PyBullet; the world cannot be used any more."""
-        self.camera.close()
-
-    def render(self) -> NDArray[np.uint8] | None:
-        """Return the last camera frame, RGB, shape [height, width, 3]; ``None`` without a render mode."""
-        if self.render_mode is None:
-            return None
-        return self.frame.copy() if self.render_mode == "rgb_array" else self.camera_picture()
 
     def camera_picture(self) -> NDArray[np.uint8]:
         """Return the last camera frame with what was cut out of it to its right, whatever the mode."""
         side = self.frame.shape[0]
         return np.hstack([self.frame, np.asarray(cv2.resize(self.crops[0], (side, side)), dtype=np.uint8)])
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """Present a thing in an orientation, both drawn at random unless ``options`` sets them."""
-        self.felt = {}
-        return super().reset(seed=seed, options=options)
-
-    def step(self, action: np.int64) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Turn the thing, which is lifted for it, and look."""
-        self.feel({"weight": self.meshes[self.object].weight})
-        return super().step(action)
+    def _weight(self) -> float:
+        return self.meshes[self.object].weight
 
     def _pattern(self) -> tuple[int, ...]:
         return (self.object * len(ORIENTATIONS) + self.state,)
@@ -150,7 +117,7 @@ def calibrated_space(features: str) -> FeatureSpace:
     Args:
         features: ``"grid-and-gradients"``, or ``module:function`` of a user's own.
     """
-    make, camera = face_features(features), MeshCamera(Camera(image_size=_SIZE), **USUAL_JITTER)
+    make, camera = face_features(features), MeshCamera(Camera(image_size=_SIZE))
     rng = np.random.default_rng(_CALIBRATION_SEED)
     looks: list[list[FloatArray]] = []
     for mesh in calibration_meshes(_CALIBRATION_THINGS, rng):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from functools import lru_cache
 from typing import Any, Final
 
@@ -10,7 +9,6 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.object_sense import ObjectSense
 from atg_fg.core.patterns import FloatArray, PatternAlphabet
 from atg_fg.senses.face_features import CROP, DEFAULT_FEATURES, face_features
@@ -28,19 +26,12 @@ from sim.bodies.pictures import TYPICAL_WEIGHT, WEIGHT_SPREAD, Difference, draw_
 from sim.vision.camera import Camera
 from sim.vision.picture_box_camera import PictureBoxCamera
 from sim.worlds.appearance_world import AppearanceWorld
+from sim.worlds.kinematic_world import KinematicWorld
 from sim.worlds.rendered_world import checked_size
 
 #: Numbers that classes of appearance can have.
 MOST_CLASSES: Final = 48
 _SLOTS: Final = ("front", "top")
-#: How much a look differs from the next one at the same box.
-USUAL_JITTER: Final = {
-    "position_jitter": 0.012,
-    "yaw_jitter": 6.0,
-    "light_jitter": 0.5,
-    "image_noise": 8.0,
-    "blur": 0.6,
-}
 #: Boxes whose pictures calibrate the features, each seen in all its orientations, and directions that are kept.
 _CALIBRATION_SEED: Final = 987_654_321
 _CALIBRATION_BOXES, _DIMENSIONS = 24, 24
@@ -57,8 +48,7 @@ class BoxesWithPictures(AppearanceWorld):
         look_alikes: Share of the boxes that look like another one.
         differ_in: What tells these from it: a single ``"face"``, or their ``"weight"`` alone.
         features: ``"colours-and-gradients"``, or ``module:function`` of a user's own.
-        object_senses: What is felt of a box as a whole.
-        noise: ``slip`` and ``missing`` of ``FiniteStateWorld``.
+        options: As for ``AppearanceWorld``.
 
     Attributes:
         boxes: The boxes, and the pictures on them.
@@ -74,14 +64,11 @@ class BoxesWithPictures(AppearanceWorld):
         look_alikes: float = 0.1,
         differ_in: Difference = "face",
         features: str = DEFAULT_FEATURES,
-        object_senses: tuple[ObjectSense, ...] = (),
-        render_mode: str | None = None,
-        **noise: float,
+        **options: Any,
     ) -> None:
         self.boxes = make_picture_boxes(n_objects, objects_seed, look_alikes=look_alikes, differ_in=differ_in)
         alphabet = PatternAlphabet(_SLOTS, MOST_CLASSES, exclusive=False)
-        told: dict[str, Any] = {"features": features, "side": CROP, "object_senses": object_senses, **noise}
-        super().__init__(n_objects, alphabet, render_mode=render_mode, **told)
+        super().__init__(n_objects, alphabet, features=features, side=CROP, **options)
 
     def feature_space(self) -> FeatureSpace:
         """Return the space of features, calibrated on pictures that are on no box of any world."""
@@ -91,10 +78,8 @@ class BoxesWithPictures(AppearanceWorld):
         return shown_pattern(self.boxes.faces[self.object], self.state)
 
 
-class PictureBoxWorld(BoxesWithPictures):
-    """One box before a camera that each look finds a little off its place, in another light.
-
-    To turn the box it is lifted, and its weight may be felt then.
+class PictureBoxWorld(KinematicWorld, BoxesWithPictures):
+    """One of many boxes with pictures that three actions turn by quarter turns: flip, left, right.
 
     Args:
         n_objects: How many boxes there are.
@@ -107,23 +92,17 @@ class PictureBoxWorld(BoxesWithPictures):
         slip: Probability that an action fails and the box stays as it is.
         missing: Probability, for each slot alone, that it is not seen.
         image_size: (width, height) of the frame, pixels.
-        position_jitter: How far at most each look finds the box off its place in x and y, m.
-        yaw_jitter: How far at most it is turned about the vertical, degrees.
-        light_jitter: How much the light changes from look to look, 0 (not at all) to 1.
-        image_noise: Standard deviation of noise on each grey level (0 to 255).
-        blur: Standard deviation of a Gaussian blur, pixels.
-        render_mode: ``"rgb_array"`` for the camera frame, ``"detections"`` for the frame with what was cut out of it
-            beside it, or ``None``.
+        render_mode: As for ``KinematicWorld``.
+        jitter: ``position_jitter``, ``yaw_jitter``, ``light_jitter``, ``image_noise`` and ``blur`` of ``ObjectCamera``.
 
     Attributes:
-        frame: The last camera frame, RGB, shape [height, width, 3].
         crops: The faces in front and on top that were cut out of it, RGB, shape [2, side, side, 3].
 
     Raises:
         InvalidInputError: An option out of its range.
     """
 
-    metadata: dict[str, Any] = {"render_modes": ["rgb_array", "detections"], "render_fps": 1}  # noqa: RUF012
+    camera: PictureBoxCamera
 
     def __init__(
         self,
@@ -138,50 +117,32 @@ class PictureBoxWorld(BoxesWithPictures):
         slip: float = 0.0,
         missing: float = 0.0,
         image_size: tuple[int, int] = (320, 240),
-        position_jitter: float = 0.012,
-        yaw_jitter: float = 6.0,
-        light_jitter: float = 0.5,
-        image_noise: float = 8.0,
-        blur: float = 0.6,
         render_mode: str | None = None,
+        **jitter: float,
     ) -> None:
-        if not isinstance(weight, bool):
-            raise InvalidInputError(f"weight: {weight!r}; expected true or false")
-        boxes: dict[str, Any] = {"look_alikes": look_alikes, "differ_in": differ_in, "features": features}
-        boxes["object_senses"] = (weight_sense(weight_error, ACTION_SOURCES),) if weight else ()
-        super().__init__(n_objects, objects_seed, render_mode=render_mode, slip=slip, missing=missing, **boxes)
-        if render_mode not in (None, *self.metadata["render_modes"]):
-            raise unknown_name("render mode", render_mode, self.metadata["render_modes"])
-        self.camera = PictureBoxCamera(
-            Camera(image_size=checked_size(image_size)),
-            position_jitter=position_jitter,
-            yaw_jitter=yaw_jitter,
-            light_jitter=light_jitter,
-            image_noise=image_noise,
-            blur=blur,
+        actions = tuple(ACTION_SOURCES)
+        super().__init__(
+            n_objects,
+            objects_seed,
+            look_alikes=look_alikes,
+            differ_in=differ_in,
+            features=features,
+            weight=weight,
+            weight_sense=ObjectSense(
+                "weight", TYPICAL_WEIGHT, WEIGHT_SPREAD, weight_error, unit="kg", revealed_by=actions
+            ),
+            slip=slip,
+            missing=missing,
+            camera=PictureBoxCamera(Camera(image_size=checked_size(image_size)), **jitter),
+            render_mode=render_mode,
         )
-        width, height = self.camera.camera.image_size
-        self.frame: NDArray[np.uint8] = np.zeros((height, width, 3), dtype=np.uint8)
-
-    def render(self) -> NDArray[np.uint8] | None:
-        """Return the last camera frame, RGB, shape [height, width, 3]; ``None`` without a render mode."""
-        if self.render_mode is None:
-            return None
-        return self.frame.copy() if self.render_mode == "rgb_array" else self.camera_picture()
 
     def camera_picture(self) -> NDArray[np.uint8]:
         """Return the last camera frame with what was cut out of it beside it, front below top, whatever the mode."""
         return beside(self.camera.outlined(self.frame), self.crops)
 
-    def reset(self, *, seed: int | None = None, options: dict[str, Any] | None = None) -> tuple[Any, dict[str, Any]]:
-        """Present a box in an orientation, both drawn at random unless ``options`` sets them."""
-        self.felt = {}
-        return super().reset(seed=seed, options=options)
-
-    def step(self, action: np.int64) -> tuple[Any, float, bool, bool, dict[str, Any]]:
-        """Turn the box, which is lifted for it, and look."""
-        self.feel({"weight": float(self.boxes.weights[self.object])})
-        return super().step(action)
+    def _weight(self) -> float:
+        return float(self.boxes.weights[self.object])
 
     def _look(self) -> dict[str, NDArray[Any]]:
         """Take a frame, and return the features of what is in front and on top of it."""
@@ -201,16 +162,6 @@ def beside(picture: NDArray[np.uint8], crops: NDArray[np.uint8]) -> NDArray[np.u
     return np.hstack([picture, np.asarray(column, dtype=np.uint8)])
 
 
-def weight_sense(error: float, actions: Iterable[str]) -> ObjectSense:
-    """Return the sense of a robot that feels the weight of these boxes.
-
-    Args:
-        error: Standard deviation of readings of a weight, as a share of it.
-        actions: Names of those in which it holds the box in the air.
-    """
-    return ObjectSense("weight", TYPICAL_WEIGHT, WEIGHT_SPREAD, error, unit="kg", revealed_by=tuple(actions))
-
-
 @lru_cache(maxsize=4)
 def calibrated_space(features: str) -> FeatureSpace:
     """Return the space of features, calibrated on pictures that are on no box of any world.
@@ -218,7 +169,7 @@ def calibrated_space(features: str) -> FeatureSpace:
     Args:
         features: ``"colours-and-gradients"``, or ``module:function`` of a user's own.
     """
-    make, camera = face_features(features), PictureBoxCamera(Camera(), **USUAL_JITTER)
+    make, camera = face_features(features), PictureBoxCamera(Camera())
     rng = np.random.default_rng(_CALIBRATION_SEED)
     looks: list[list[FloatArray]] = []
     for _ in range(_CALIBRATION_BOXES):

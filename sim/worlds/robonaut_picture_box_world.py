@@ -5,24 +5,22 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any, Final
 
-import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.object_sense import ObjectSense
 from atg_fg.core.patterns import FloatArray
 from atg_fg.senses.face_features import rectified
-from atg_fg.senses.tag_drawing import SLOT_COLOURS
-from atg_fg.worlds.arcube import FRONT, TOP, Cube
-from sim.bodies.cube import CUBE_SIZE, face_corners
+from atg_fg.worlds.arcube import Cube
+from sim.bodies.cube import CUBE_SIZE
 from sim.bodies.pictures import TYPICAL_WEIGHT, WEIGHT_SPREAD
 from sim.bodies.tables import WOOD
 from sim.manipulation.weighing import Scales, TorqueSensors
-from sim.vision.box_pose import turned
 from sim.vision.camera import Light
 from sim.vision.cube_pose import CubePose
 from sim.vision.cuboid_fit import Cuboid, find_tabletop, points_of
+from sim.vision.image_noise import in_usual_light
+from sim.vision.picture_box_camera import outlined, shown_faces
 from sim.worlds.domain_randomization import Circumstances
 from sim.worlds.picture_box_world import BoxesWithPictures, beside
 from sim.worlds.robonaut_world import RobonautWorld
@@ -69,21 +67,15 @@ class RobonautPictureBoxWorld(RobonautWorld, BoxesWithPictures):
         image_size: tuple[int, int] = (400, 300),
         **options: Any,
     ) -> None:
-        if not isinstance(weight, bool):
-            raise InvalidInputError(f"weight: {weight!r}; expected true or false")
-        self.depth: NDArray[np.float32] = np.zeros(image_size[::-1], dtype=np.float32)
         self.box: Cuboid | None = None
         self.weighed: float | None = None
-        senses = (_WEIGHT,) if weight else ()
-        super().__init__(n_objects, objects_seed, image_size=image_size, object_senses=senses, **options)
+        options |= {"weight": weight, "weight_sense": _WEIGHT}
+        super().__init__(n_objects, objects_seed, image_size=image_size, **options)
+        self.depth: NDArray[np.float32] = np.zeros(self.frame.shape[:2], dtype=np.float32)
 
     def camera_picture(self) -> NDArray[np.uint8]:
         """Return the last frame with the faces outlined that were found, and what was cut out beside it."""
-        drawn = self.frame.copy()
-        for slot, corners in zip(("front", "top"), self._found_faces(), strict=False):
-            outline = np.round(corners).astype(np.int32)
-            cv2.polylines(drawn, [outline], True, SLOT_COLOURS[slot], 2, cv2.LINE_AA)
-        return beside(drawn, self.crops)
+        return beside(outlined(self.frame, self._found_faces()), self.crops)
 
     def errors(self) -> dict[str, float | None]:
         """Return how far off the truth the last look and the last action were: position, m, yaw, degrees, mass, kg.
@@ -140,7 +132,7 @@ class RobonautPictureBoxWorld(RobonautWorld, BoxesWithPictures):
                 light = float(np.median(self.frame[found.table].sum(axis=1))) / _USUAL_TABLE
         faces = self._found_faces()
         self.seen[:] = len(faces) > 0
-        usual = np.clip(np.round(self.frame / np.float32(light)), 0, 255).astype(np.uint8)
+        usual = in_usual_light(self.frame, light)
         self.crops = np.array([rectified(usual, face) for face in faces]) if faces else np.zeros_like(self.crops)
 
     def _found_cube(self) -> CubePose | None:
@@ -148,10 +140,7 @@ class RobonautPictureBoxWorld(RobonautWorld, BoxesWithPictures):
 
     def _found_faces(self) -> list[NDArray[np.float64]]:
         """Return the corners of what is in front and on top, each of shape [4, 2], pixels; nothing without a box."""
-        if self.box is None:
-            return []
-        rotation = turned(self.box.yaw)
-        return [self.camera.project(face_corners(face, rotation, self.box.centre)) for face in (FRONT, TOP)]
+        return [] if self.box is None else shown_faces(self.camera, self.box.yaw, self.box.centre)
 
     def _truth(self, *, slipped: bool) -> dict[str, Any]:
         return {**super()._truth(slipped=slipped), "mass": self.circumstances.cube_mass}

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from atg_fg.core.errors import InvalidInputError, UnknownNameError
+from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.goals import Goal
 from atg_fg.core.memory import RobotMemory
 from atg_fg.display.atg_picture import draw_atg
@@ -66,16 +66,6 @@ def test_boxes_share_pictures_and_no_two_are_the_same_however_they_are_turned():
         if n
     ]
     assert nearest == [1] * 39
-
-
-def test_observations_are_of_the_space_and_each_look_is_drawn_anew(world):
-    first, _ = world.reset(seed=1, options={"object": 2, "orientation": 5})
-    again, _ = world.reset(seed=1, options={"object": 2, "orientation": 5})
-    other, info = world.reset(seed=2, options={"object": 2, "orientation": 5})
-    assert world.observation_space.contains(first)
-    assert (first["appearance"] == again["appearance"]).all()
-    assert (first["appearance"] != other["appearance"]).any()
-    assert (info["object"], info["orientation"]) == (2, 5)
 
 
 def test_a_quarter_turn_of_a_crop_has_the_same_features(world):
@@ -197,29 +187,6 @@ def test_a_memory_that_counts_on_weights_is_refused_where_there_are_none(world):
         inference = begin_trial("bayes-filter", memory, preset("default"))
         with pytest.raises(InvalidInputError, match="expected readings of it, too: weight, measured"):
             run_trial(world, inference, RandomPolicy(), 1, np.random.default_rng(0))
-
-
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"weight": "yes"}, "weight: 'yes'; expected true or false"),
-        ({"differ_in": "smell"}, "differ_in: 'smell'; expected one of: face, weight"),
-        ({"weight_error": -0.1, "weight": True}, "object sense 'weight': error -0.1"),
-        ({"features": "no_such_module:embed"}, "features: 'no_such_module:embed'"),
-        ({"features": "sift"}, "expected 'colours-and-gradients', 'grid-and-gradients' or module:function"),
-        ({"look_alikes": 2.0}, "look_alikes: 2.0; expected a probability"),
-        ({"image_noise": -1.0}, "image_noise: -1.0; expected a finite number"),
-        ({"n_objects": 0}, "n_objects: 0"),
-    ],
-)
-def test_options_of_nonsense_are_refused(options, message):
-    with pytest.raises(InvalidInputError, match=message):
-        make_world_with("picture-box", options.pop("n_objects", 3), 0, **options)
-
-
-def test_there_is_one_render_mode():
-    with pytest.raises(UnknownNameError, match="human"):
-        make_world_with("picture-box", 3, 0, render_mode="human")
 
 
 def test_a_goal_can_be_given_by_a_crop(world):

@@ -184,6 +184,7 @@ def test_pictures_show_what_was_found(make):
         ({"condition": "broken"}, UnknownNameError, "broken"),
         ({"render_mode": "human"}, UnknownNameError, "human"),
         ({"image_size": (4, 4)}, InvalidInputError, "image_size"),
+        ({"image_size": 400}, InvalidInputError, "image_size: 400; expected width and height"),
     ],
 )
 def test_options_of_nonsense_are_refused(options, error, message):
