@@ -69,8 +69,7 @@ class RobonautPictureBoxWorld(RobonautWorld, BoxesWithPictures):
     ) -> None:
         self.box: Cuboid | None = None
         self.weighed: float | None = None
-        options |= {"weight": weight, "weight_sense": _WEIGHT}
-        super().__init__(n_objects, objects_seed, image_size=image_size, **options)
+        super().__init__(n_objects, objects_seed, image_size=image_size, weight=weight, weight_sense=_WEIGHT, **options)
         self.depth: NDArray[np.float32] = np.zeros(self.frame.shape[:2], dtype=np.float32)
 
     def camera_picture(self) -> NDArray[np.uint8]:
