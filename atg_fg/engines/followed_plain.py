@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import copy
-from dataclasses import astuple
-
 from atg_fg.core.patterns import Evidence, FloatArray, IntArray
+from atg_fg.engines.followed import Followed
 from atg_fg.inference.belief_components import BeliefComponent, components_of
 from atg_fg.inference.chain import Chain, build_chain, forward_backward
 from atg_fg.inference.history import History
@@ -15,7 +13,7 @@ from atg_fg.learning.plain_evidence import PlainNoise
 from atg_fg.learning.plain_filter import PlainFilter
 
 
-class FollowedPlain:
+class FollowedPlain(Followed[PlainFilter]):
     """Plain ATGs with an α and δ of their own.
 
     Args:
@@ -28,24 +26,9 @@ class FollowedPlain:
     """
 
     def __init__(self, model: RecognitionModel, log_weights: FloatArray, history: History) -> None:
-        self._log_weights, self._history = log_weights, history
-        self.words = words_of_noise(PlainNoise(*astuple(model.parameters)[:2]))
-        self.filter = PlainFilter(model, log_weights)
-
-    def weighted(self, log_weight: float) -> FollowedPlain:
-        """Return the same kind, a factor less probable."""
-        twin = copy.copy(self)
-        twin._log_weights = self._log_weights + log_weight
-        return twin
-
-    def weigh(self, log_likelihood: FloatArray) -> None:
-        """Take in what was felt of the object as a whole: ln p(reading | O), shape [H]."""
-        self._log_weights = self.filter.log_weights = self._log_weights + log_likelihood
-
-    @property
-    def log_joint(self) -> FloatArray:
-        """Ln p(O, the object is of this kind, z_0:t | a_1:t), shape [H]."""
-        return self._log_weights + self.filter.log_evidence
+        self._history, parameters = history, model.parameters
+        noise = PlainNoise(parameters.transition_concentration, parameters.observation_noise)
+        super().__init__(words_of_noise(noise), log_weights, PlainFilter(model, log_weights))
 
     def observe(self, evidence: Evidence) -> None:
         """Take in the evidence of a look, the last of the history, and learn from it."""

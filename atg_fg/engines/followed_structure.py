@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import copy
-
 import numpy as np
 
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.patterns import Evidence, FloatArray, IntArray
+from atg_fg.engines.followed import Followed
 from atg_fg.inference.belief_components import LEAST_PROBABILITY, BeliefComponent
 from atg_fg.inference.chain import Chain, forward_backward
 from atg_fg.inference.history import History
@@ -20,7 +19,7 @@ from atg_fg.learning.pose_filter import PoseFilter
 from atg_fg.learning.rates import Rates
 
 
-class FollowedStructure:
+class FollowedStructure(Followed[PoseFilter]):
     """One believed structure in a trial.
 
     Args:
@@ -35,26 +34,10 @@ class FollowedStructure:
 
     def __init__(self, believed: BelievedStructure, log_weights: FloatArray, rates: Rates, memory: RobotMemory) -> None:
         self._poses, self._rates, self._alphabet = believed.structure.poses(), rates, memory.assumptions.alphabet
-        self.words = words_of_structure(believed.structure)
-        self._log_weights = log_weights
         new = np.zeros((1, *believed.contents.shape[1:]))
         contents = np.concatenate((believed.contents, new))
-        self.filter = PoseFilter(self._poses, contents, rates, self._alphabet, log_weights)
-
-    def weighted(self, log_weight: float) -> FollowedStructure:
-        """Return the same structure, a factor less probable."""
-        twin = copy.copy(self)
-        twin._log_weights = self._log_weights + log_weight
-        return twin
-
-    def weigh(self, log_likelihood: FloatArray) -> None:
-        """Take in what was felt of the object as a whole: ln p(reading | O), shape [H]."""
-        self._log_weights = self.filter.log_weights = self._log_weights + log_likelihood
-
-    @property
-    def log_joint(self) -> FloatArray:
-        """Ln p(O, the object follows this structure, z_0:t | a_1:t), shape [H]."""
-        return self._log_weights + self.filter.log_evidence
+        own = PoseFilter(self._poses, contents, rates, self._alphabet, log_weights)
+        super().__init__(words_of_structure(believed.structure), log_weights, own)
 
     def components(self, belief: FloatArray) -> list[BeliefComponent]:
         """Return the component of each probable object, with its poses as aspects.

@@ -8,7 +8,6 @@ A memory that has learned no structure leaves the Bayes filter alone.
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable
 from functools import partial
 from typing import ClassVar, Final, NamedTuple
@@ -22,6 +21,7 @@ from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, FloatArray, IntArray
 from atg_fg.core.records import Mistake
 from atg_fg.engines.bayes_filter import BayesFilter
+from atg_fg.engines.followed_chain import FollowedChain
 from atg_fg.engines.followed_plain import FollowedPlain
 from atg_fg.engines.followed_structure import FollowedStructure
 from atg_fg.inference.belief_components import LEAST_PROBABILITY, BeliefComponent, components_of, shown_patterns_of
@@ -31,14 +31,10 @@ from atg_fg.inference.explanations import best_explanations
 from atg_fg.inference.interface import TrialSetup
 from atg_fg.inference.recognition_model import COLLECTION, RecognitionModel
 from atg_fg.learning.believed_structure import BelievedStructure
-from atg_fg.learning.completion import pose_graph
-from atg_fg.learning.evidence_learner import BelievedChain
 from atg_fg.learning.object_kinds import PLAIN_WORDS
-from atg_fg.learning.path_filter import PathFilter
 from atg_fg.learning.pose_belief_tree import Following, StructureBelief
 from atg_fg.learning.rates import Rates
 from atg_fg.learning.raw_trials import RawTrial
-from atg_fg.learning.shared_structure import Poses
 from atg_fg.learning.structured_memory import StructuredMemory
 
 #: A structure less probable than this, given the trial so far, is left out of the rest of it.
@@ -326,68 +322,3 @@ class LearnedStructure(BayesFilter):
                 states[states >= len(aspects)] = COLLECTION  # not known yet at that time
                 aspects += weight / sum(weights) * np.bincount(states, shown, len(aspects))
         return mixed
-
-
-class FollowedChain:
-    """One chain of samples in a trial.
-
-    Args:
-        chain: The chain, and what it says of the remembered objects.
-        memory: For the noise and the assumptions.
-        log_weight: ln of the weight of all chains.
-        prior: p(O) in place of the chain's own, if it is not the memory's.
-
-    Attributes:
-        filter: Over paths and contents of each object and of *unseen*.
-    """
-
-    def __init__(
-        self, chain: BelievedChain, memory: StructuredMemory, log_weight: float, prior: FloatArray | None
-    ) -> None:
-        self._noise, self._alphabet = memory.evidence.noise, memory.assumptions.alphabet
-        self.words = "one whose looks err"
-        beforehand = chain.log_prior
-        if prior is not None:
-            beforehand = np.where(np.isfinite(beforehand), log_of(prior), -np.inf)
-        self._log_weights: FloatArray = log_weight + np.log(chain.weight) + beforehand
-        self.filter = PathFilter(chain, self._noise, self._alphabet, self._log_weights)
-        n_states = len(chain.registers)
-        self._poses = Poses(chain.registers, chain.successors.T, np.arange(n_states), np.full(n_states, 1.0 / n_states))
-        self._rates = Rates(slip=chain.slip, wrong=memory.evidence.noise.wrong)
-
-    def weighted(self, log_weight: float) -> FollowedChain:
-        """Return the same chain, a factor less probable."""
-        twin = copy.copy(self)
-        twin._log_weights = self._log_weights + log_weight
-        return twin
-
-    def weigh(self, log_likelihood: FloatArray) -> None:
-        """Take in what was felt of the object as a whole: ln p(reading | O), shape [H]."""
-        self._log_weights = self.filter.log_weights = self._log_weights + log_likelihood
-
-    @property
-    def log_joint(self) -> FloatArray:
-        """Ln p(O, the chain, z_0:t | a_1:t), shape [H]."""
-        return self._log_weights + self.filter.log_evidence
-
-    def observe(self, evidence: Evidence) -> None:
-        """Take in the evidence of a look."""
-        self.filter.observe(evidence)
-
-    def components(self, belief: FloatArray) -> list[BeliefComponent]:
-        """Return the component of each probable object, with its states as aspects.
-
-        Args:
-            belief: p(O, the chain | z_0:t, a_1:t), shape [H].
-        """
-        components = []
-        for hypothesis in np.flatnonzero(belief >= LEAST_PROBABILITY).tolist():
-            contents = self.filter.learned_contents(hypothesis)
-            graph = pose_graph(self._poses, contents, self._rates, self._alphabet)
-            poses = self.filter.poses_of(hypothesis)
-            components.append(BeliefComponent(hypothesis, float(belief[hypothesis]), graph, poses))
-        return components
-
-    def smoothed_patterns(self, hypothesis: int, inference: LearnedStructure) -> list[FloatArray]:
-        """Return p(pattern shown at time s | O = hypothesis, all evidence) of every time s, each of shape [|𝒵|]."""
-        return self.filter.smoothed_patterns(hypothesis)
