@@ -17,7 +17,6 @@ import numpy as np
 from atg_fg.core.actions import AnyAction, UncertainAction
 from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.log_math import log_of, log_sum_exp
-from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, FloatArray, IntArray
 from atg_fg.core.records import Mistake
 from atg_fg.engines.bayes_filter import BayesFilter
@@ -96,7 +95,7 @@ class LearnedStructure(BayesFilter):
         if members.max() < NEGLIGIBLE:
             return
         self._log_plain = log_of(np.maximum(1.0 - followers - members, 0.0))
-        model = RecognitionModel(memory, ModelParameters(*uncertain.noise), self.prior)
+        model = RecognitionModel(memory, uncertain.noise.parameters, self.prior)
         self._followed.append(FollowedPlain(model, log_of(model.prior * members), self.history))
 
     def _follow_chains(self, memory: StructuredMemory) -> None:

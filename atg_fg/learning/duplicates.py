@@ -155,7 +155,7 @@ class _Odds:
             plain_share -= each.weight * each.share
         if self._uncertain is not None:
             noise, members, share = self._uncertain
-            uncertain = np.array([self._plain_factor(index, other, ModelParameters(*noise)) for other in others])
+            uncertain = np.array([self._plain_factor(index, other, noise.parameters) for other in others])
             mine, theirs = members[index], members[list(others)]
             terms.append(log_of(mine * theirs / share) + uncertain)
             mine_plain, theirs_plain, plain_share = mine_plain - mine, theirs_plain - theirs, plain_share - share

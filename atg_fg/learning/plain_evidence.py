@@ -16,6 +16,7 @@ import numpy as np
 from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, FloatArray, IntArray
 from atg_fg.learning.raw_trials import RawTrial
 
@@ -25,6 +26,11 @@ class PlainNoise(NamedTuple):
 
     concentration: float
     noise: float
+
+    @property
+    def parameters(self) -> ModelParameters:
+        """These of a model that learns within the trial."""
+        return ModelParameters(transition_concentration=self.concentration, observation_noise=self.noise)
 
 
 #: Of objects whose actions are sure.
