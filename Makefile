@@ -151,7 +151,7 @@ results-robot: $(READY)  ## Run the experiments on the simulated robot (about an
 	done
 	$(BIN)/atg-fg sim picture --output docs/images/robonaut.png --film docs/images/robonaut.gif \
 		--table docs/images/robonaut_table.png
-	$(BIN)/atg-fg sim reliability --pictures --actions 100 --json results/reliability_pictures_nominal.json
+	$(BIN)/atg-fg sim reliability --pictures --actions 500 --json results/reliability_pictures_nominal.json
 	$(BIN)/atg-fg table1 --world robonaut-picture-box --condition nominal --preset learned --tests 1 --resume \
 		--records results/robonaut/pictures_nominal_learned --json results/table1_robonaut-picture-box_learned.json
 	$(BIN)/atg-fg sim picture --pictures --seed 18 --output docs/images/robonaut_pictures.png \
