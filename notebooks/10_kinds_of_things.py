@@ -157,7 +157,7 @@ with plot_style():
 figure
 
 # %% [markdown]
-# Colours are those of the kinds above. Most are sure within three or four looks. Whether it is a cube or a prism stays
+# Colours are those of the kinds above. Most are sure within four looks. Whether it is a cube or a prism stays
 # open for as long as what was done looks the same on both: the policy asks which object it is, not of which kind.
 # Once the kind is known, the robot foretells what an action will do to a thing that it has never held.
 #
@@ -194,7 +194,7 @@ atg.plot_belief(record)
 # ## Where it fails
 #
 # What a kind foretells helps with objects that have a structure. Random graphs have none: which aspects there are and
-# where actions lead is each object's own, and here an action leads to one of two aspects by chance. The robot finds
+# where actions lead is each object's own, and here an action leads to one of three aspects by chance. The robot finds
 # out that actions are uncertain, and tells such objects apart by what it has seen of them alone. Ten actions show
 # some nine aspects of 24, which is often too little to overlap with what is remembered:
 
