@@ -20,8 +20,6 @@ from atg_fg.learning.saved_chain import SavedChain
 
 #: A structure that takes more labels than this for wrong explains nothing.
 MOST_WRONG: Final = 0.3
-#: Nats of evidence from which on errors are taken for a structure's mistakes: few that recur may be accidents.
-SURE_OF_MISTAKES: Final = 5.0
 #: A trial is of a new object if that is more probable than this.
 NOVEL: Final = 0.5
 #: Classes of structure that are rivals where there is one slot.
@@ -225,7 +223,7 @@ class EvidenceLearner:
             return False
         if state.noise.wrong > MOST_WRONG:
             return True
-        return best.log_odds_of_mistakes(self._task(self.learner.trials, state.noise)) > SURE_OF_MISTAKES
+        return best.log_odds_of_mistakes(self._task(self.learner.trials, state.noise)) > 0
 
     def log_gain_over_chance(self) -> FloatArray:
         """Return ln p(trial | a fresh object, the best chain) / p(labels drawn uniformly) of each trial, shape [N]."""
