@@ -11,9 +11,7 @@ README = (ROOT / "README.md").read_text()
 
 
 def test_it_is_one_page():
-    prose = re.sub(
-        r"```.*?```|!\[[^]]*\]\([^)]*\)|^\*[^*]+\*$|\]\([^)]*\)", "", README, flags=re.DOTALL | re.MULTILINE
-    )
+    prose = re.sub(r"```.*?```|!\[[^]]*\]\([^)]*\)|^\*[^*]+\*$|\]\([^)]*\)", "", README, flags=re.DOTALL | re.MULTILINE)
     assert len(prose.split()) <= 900
 
 
