@@ -209,11 +209,24 @@ def test_the_guides_to_ones_own_data_print_what_they_say(tmp_path, monkeypatch):
 def test_the_bag_of_the_guide_is_read_by_its_topics(tmp_path):
     from atg_fg.storage.rosbag_recordings import read_topics
 
-    (topics,) = blocks("your_data.md", "json")
+    _, topics = blocks("your_data.md", "json")
     (tmp_path / "topics.json").write_text(topics)
     found = read_topics(tmp_path / "topics.json")
     assert found.slots["label"].topic == "/detections"
     assert (found.action.label, found.trial.topic) == ("data", "/trial")
+
+
+def test_the_guide_says_what_is_known_of_a_weight(tmp_path):
+    from atg_fg.storage.recordings import read_recording, read_spec
+
+    senses, _ = blocks("your_data.md", "json")
+    (tmp_path / "spec.json").write_text(senses)
+    (rows,) = blocks("your_data.md", "csv")
+    (tmp_path / "looks.csv").write_text(rows)
+    recording = read_recording(tmp_path / "looks.csv", read_spec(tmp_path / "spec.json"))
+    (weight,) = recording.senses
+    assert (weight.name, weight.revealed_by) == ("weight", ("lift",))
+    assert recording.trials[0].readings_of("weight") == [0.74]
 
 
 def test_the_formats_page_shows_a_recording_that_is_read(tmp_path):

@@ -44,6 +44,7 @@ def check(
         "slots": list(recording.slots),
         "actions": list(recording.actions),
         "labels": list(recording.labels),
+        "readings": list(recording.sense_names),
         "objects": sorted({trial.object for trial in recording.trials if trial.object is not None}),
     }
     document = {

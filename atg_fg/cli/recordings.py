@@ -26,10 +26,10 @@ from atg_fg.learning.structured_memory import StructuredMemory, memory_for
 from atg_fg.storage import plain_files
 from atg_fg.storage.memory_files import goes_to_database, load_memory, open_memory, save_memory
 from atg_fg.storage.presets import preset as preset_named
+from atg_fg.storage.recording_oddities import oddities
 from atg_fg.storage.recordings import (
     RecordingSpec,
     merged_spec,
-    oddities,
     read_recording,
     read_spec,
 )

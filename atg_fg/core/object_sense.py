@@ -27,6 +27,13 @@ MOST_OBJECT_SENSES: Final = 2
 MOST_RATIO: Final = 250.0
 #: Readings are numbers up to here.
 GREATEST_READING: Final = 1e12
+#: Readings that an error is worth which was only guessed from them.
+_GUESSED: Final = 4.0
+#: How many times as much objects differ as readings err, if readings do not say, and how many times at most then.
+_DIFFERENT: Final = 5.0
+_SURELY: Final = 50.0
+#: Standard deviation between objects, of the logarithm, that is taken for granted at least.
+_LEAST_SPREAD: Final = 0.3
 
 
 @dataclass(frozen=True)
@@ -100,6 +107,35 @@ class ObjectSense:
                 f"{place}: spread {self.spread:g}, error {self.error:g}; expected at most {MOST_RATIO:g} times as much"
             )
         object.__setattr__(self, "revealed_by", tuple(self.revealed_by))
+
+    @classmethod
+    def of_readings(cls, name: str, trials: Iterable[Sequence[float]], revealed_by: Sequence[str] = ()) -> ObjectSense:
+        """Return a sense of which nothing is known but readings, of one object in each trial.
+
+        Errors are relative if all readings are above 0. Readings err by as much as they differ in a trial: worth few of
+        them, so that what is learned corrects it. Trials may all be of one object, so objects are taken to differ by
+        some times as much at least.
+        """
+        groups = [list(each) for each in trials if len(each)]
+        relative = all(value > 0 for each in groups for value in each)
+        on_scale = [[math.log(value) for value in each] if relative else each for each in groups] or [[0.0]]
+        means = [math.fsum(each) / len(each) for each in on_scale]
+        typical, between = math.fsum(means) / len(means), float(np.std(means))
+        free = sum(len(each) - 1 for each in on_scale)
+        scatter = math.fsum((value - mean) ** 2 for each, mean in zip(on_scale, means, strict=True) for value in each)
+        within = math.sqrt(scatter / free) if free else 0.0
+        least = _LEAST_SPREAD if relative else 1e-3 * max(abs(typical), 1e-3)
+        spread = min(max(between, _DIFFERENT * within, least), GREATEST_READING)
+        error = min(max(within, spread / _SURELY), spread / _DIFFERENT) if within else spread / _DIFFERENT
+        return cls(
+            name,
+            math.exp(typical) if relative else typical,
+            spread,
+            error,
+            relative=relative,
+            worth=_GUESSED,
+            revealed_by=tuple(revealed_by),
+        )
 
     def check(self, value: Any, place: str) -> float:
         """Return a reading as a float, or raise ``InvalidInputError`` naming ``place`` and the unit."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
@@ -11,7 +12,8 @@ import numpy as np
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.checks import listed
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.core.patterns import Evidence, PatternAlphabet
+from atg_fg.core.object_sense import ObjectSense, check_measured
+from atg_fg.core.patterns import Evidence, Measured, PatternAlphabet
 
 #: Aspects of an object, if nothing is said of their number and there are more patterns than that.
 USUAL_ASPECTS = 24
@@ -24,26 +26,30 @@ class RecordedLook(NamedTuple):
         labels: The label in each slot, ``None`` where nothing was seen, or where there are weights.
         confidences: Of each label; ``None`` where the detector does not say.
         weights: Likelihood of each label in each slot, by label; ``None`` of a slot without.
+        measured: Readings of the object as a whole, such as its weight.
     """
 
     labels: tuple[str | None, ...]
     confidences: tuple[float | None, ...] = ()
     weights: tuple[Mapping[str, float] | None, ...] = ()
+    measured: Measured = ()
 
-    def evidence(self, alphabet: PatternAlphabet) -> Evidence:
+    def evidence(self, assumptions: Assumptions) -> Evidence:
         """Return the look as evidence.
 
         Raises:
-            InvalidInputError: A label that is none of the alphabet's, or that repeats where labels exclude each other.
+            InvalidInputError: A label that is none of the alphabet's, or that repeats where labels exclude each other;
+                or a reading that is none of a sense.
         """
+        alphabet, measured = assumptions.alphabet, check_measured(assumptions.object_senses, dict(self.measured))
         stated = self.confidences if any(value is not None for value in self.confidences) else ()
         if not any(self.weights):
-            return Evidence.of_detection(alphabet, self.labels, stated)
+            return Evidence.of_detection(alphabet, self.labels, stated).with_readings(measured)
         likelihoods = [
             None if each is None else np.array([each.get(name, 0.0) for name in alphabet.names])
             for each in self.weights
         ]
-        return Evidence.of_slots(alphabet, likelihoods, self.labels, stated)
+        return Evidence.of_slots(alphabet, likelihoods, self.labels, stated).with_readings(measured)
 
 
 class RecordedTrial(NamedTuple):
@@ -61,6 +67,10 @@ class RecordedTrial(NamedTuple):
     actions: tuple[str, ...]
     object: str | None = None
 
+    def readings_of(self, name: str) -> list[float]:
+        """Return the readings of one sense, in the order of the looks."""
+        return [value for look in self.looks for sense, value in look.measured if sense == name]
+
 
 @dataclass(frozen=True)
 class Recording:
@@ -75,6 +85,7 @@ class Recording:
         n_aspects: |G|, if it is said.
         exclusive: Whether a label is in one slot only.
         place: The file, for error messages.
+        senses: Of the object, that looks may have readings of: what is known of each beforehand, or its name alone.
     """
 
     slots: tuple[str, ...]
@@ -85,6 +96,12 @@ class Recording:
     n_aspects: int | None = None
     exclusive: bool = False
     place: str = "recording"
+    senses: tuple[ObjectSense | str, ...] = ()
+
+    @property
+    def sense_names(self) -> tuple[str, ...]:
+        """Names of the senses of the object."""
+        return tuple(each if isinstance(each, str) else each.name for each in self.senses)
 
     def taught_as(self, name: str) -> Recording:
         """Return the recording with all trials of the object of this name."""
@@ -105,7 +122,17 @@ class Recording:
             raise InvalidInputError(f"{self.place}: does not say how many objects there are; expected --objects N")
         alphabet = PatternAlphabet.named(self.slots, self.labels, exclusive=self.exclusive, is_open=is_open)
         n_aspects = self.n_aspects or min(len(alphabet), USUAL_ASPECTS)
-        return Assumptions(n_objects, n_aspects, self.actions, alphabet)
+        senses = tuple(self._sense(each) if isinstance(each, str) else each for each in self.senses)
+        return Assumptions(n_objects, n_aspects, self.actions, alphabet, senses)
+
+    def _sense(self, name: str) -> ObjectSense:
+        """Return what the readings of a sense say of it: actions reveal one if a reading mostly comes after them."""
+        after = Counter[str]()
+        for trial in self.trials:
+            for action, look in zip(trial.actions, trial.looks[1:], strict=False):
+                after[action] += 1 if name in dict(look.measured) else -1
+        revealing = tuple(action for action in self.actions if after[action] > 0)
+        return ObjectSense.of_readings(name, [trial.readings_of(name) for trial in self.trials], revealing)
 
 
 def check_fits(recording: Recording, assumptions: Assumptions) -> None:
@@ -118,6 +145,11 @@ def check_fits(recording: Recording, assumptions: Assumptions) -> None:
             f"{recording.place}: slots {listed(recording.slots)}; expected those of the memory: "
             f"{listed(assumptions.alphabet.slots)}"
         )
+    known = {sense.name for sense in assumptions.object_senses}
+    for name in senses_of(recording.trials):
+        if name not in known:
+            there = f"those of the memory: {listed(known)}" if known else "none, as the memory was begun without"
+            raise InvalidInputError(f"{recording.place}: readings of {name!r}; expected {there}")
     for trial in recording.trials:
         for step, action in enumerate(trial.actions):
             assumptions.action_index(action, f"{recording.place}: trial {trial.name}, step {step}: action")
@@ -153,3 +185,8 @@ def used_labels(trials: Sequence[RecordedTrial]) -> list[str]:
             for weights in look.weights:
                 found.update(dict.fromkeys(weights or ()))
     return list(found)
+
+
+def senses_of(trials: Sequence[RecordedTrial]) -> list[str]:
+    """Return the names of the senses of the object that trials have readings of, in the order in which they come up."""
+    return list(dict.fromkeys(name for trial in trials for look in trial.looks for name, _ in look.measured))

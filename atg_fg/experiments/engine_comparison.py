@@ -99,7 +99,7 @@ class Course(NamedTuple):
             InvalidInputError: It has a label or an action that is unknown under these assumptions.
         """
         if isinstance(trial, RecordedTrial):
-            looks = [look.evidence(assumptions.alphabet) for look in trial.looks]
+            looks = [look.evidence(assumptions) for look in trial.looks]
             return cls(looks, [assumptions.action_index(action) for action in trial.actions])
         looks = [evidence_in(assumptions.alphabet, step.detection, step.truth) for step in trial.steps]
         return cls(looks, trial.actions)

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.core.look_info import truth_of
+from atg_fg.core.look_info import measured_in, truth_of
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence
@@ -148,7 +148,7 @@ def _evidence(trial: RecordedTrial, memory: RobotMemory, place: str) -> list[Evi
     looks = []
     for step, look in enumerate(trial.looks):
         try:
-            looks.append(look.evidence(memory.assumptions.alphabet))
+            looks.append(look.evidence(memory.assumptions))
         except InvalidInputError as error:
             raise InvalidInputError(f"{place}: trial {trial.name}, step {step}: {error}") from error
     return looks
@@ -256,6 +256,7 @@ def _step_document(number: int, step: TrialStep, record: TrialRecord) -> dict[st
             slot: None if symbol is None else alphabet.name_of(symbol)
             for slot, symbol in zip(alphabet.slots, step.detection, strict=True)
         },
+        **({"measured": dict(measured)} if (measured := measured_in(step.truth)) else {}),
         "action": None if step.action is None else record.assumptions.actions[step.action],
         "unseen": float(step.belief.unseen),
         "objects": dict(objects),

@@ -2,7 +2,7 @@
 
 A trial is an episode. Its observations are looks as worlds here give them: in each slot the number of a label,
 ``MISSING`` where nothing was seen; rewards are zero. What offline learners do not ask for is in ``infos``
-(``confidence``, ``likelihood``) and in metadata (names).
+(``confidence``, ``likelihood``, ``measured``) and in metadata (names).
 """
 
 from __future__ import annotations
@@ -116,7 +116,10 @@ def _names(text: Any, place: str) -> dict[str, Any]:
     """Return the header that was written with a dataset."""
     header = parse_json(plain_text(text, place), place)
     return read_object(
-        header, place, ("format", "version", "slots", "actions", "labels"), ("objects", "aspects", "exclusive")
+        header,
+        place,
+        ("format", "version", "slots", "actions", "labels"),
+        ("objects", "aspects", "exclusive", "senses"),
     )
 
 
@@ -171,7 +174,10 @@ def _observations(trial: RecordedTrial, recording: Recording) -> Any:
 
 
 def _infos(trial: RecordedTrial, recording: Recording) -> dict[str, Any]:
-    """Return confidences, shape [t + 1, J], and likelihoods, [t + 1, J, V], not a number where there are none."""
+    """Return what offline learners do not ask for, not a number where there is none.
+
+    Confidences have the shape [t + 1, J], likelihoods [t + 1, J, V], readings of senses of the object [t + 1, S].
+    """
     shape = (len(trial.looks), len(recording.slots))
     infos = {}
     if any(look.confidences for each in recording.trials for look in each.looks):
@@ -185,6 +191,9 @@ def _infos(trial: RecordedTrial, recording: Recording) -> dict[str, Any]:
             for slot, weights in enumerate(look.weights):
                 if weights is not None:
                     infos["likelihood"][time, slot] = [weights.get(label, 0.0) for label in recording.labels]
+    if recording.senses:
+        readings = [[dict(look.measured).get(name, np.nan) for name in recording.sense_names] for look in trial.looks]
+        infos["measured"] = np.array(readings, dtype=np.float64)
     return infos
 
 
@@ -209,6 +218,8 @@ def _trial(episode: Any, about: Any, header: Any, place: str) -> dict[str, Any]:
         if not np.isnan(weights).any():
             looks[time][slot] = dict(zip(header["labels"], weights.tolist(), strict=True))
     stated = _info(episode, "confidence", observed.shape, place)
+    names = [each if isinstance(each, str) else each["name"] for each in header.get("senses", [])]
+    felt = _info(episode, "measured", (len(observed), len(names)), place) if names else None
     document: dict[str, Any] = {
         "trial": str(about.get("trial", episode.id)),
         "actions": [header["actions"][action] for action in actions.tolist()],
@@ -217,6 +228,9 @@ def _trial(episode: Any, about: Any, header: Any, place: str) -> dict[str, Any]:
         "confidences": None
         if stated is None
         else [[None if np.isnan(sure) else sure for sure in row] for row in stated.tolist()],
+        "measured": None
+        if felt is None
+        else [{name: value for name, value in zip(names, row, strict=True) if not np.isnan(value)} for row in felt],
     }
     return without_none(document)
 

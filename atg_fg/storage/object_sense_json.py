@@ -35,9 +35,10 @@ def read_object_senses(value: Any, place: str) -> tuple[ObjectSense, ...]:
     senses = []
     for index, entry in enumerate(read_list(value, place)):
         where = f"{place}[{index}]"
-        keys = ("name", "unit", "typical", "spread", "error", "relative", "revealed_by")
-        fields = read_object(entry, where, keys, ("worth",))
-        actions = tuple(plain_text(name, f"{where}.revealed_by") for name in read_list(fields["revealed_by"], where))
+        keys, further = ("name", "typical", "spread", "error"), ("unit", "relative", "revealed_by", "worth")
+        fields = read_object(entry, where, keys, further)
+        revealing = read_list(fields.get("revealed_by", []), where)
+        actions = tuple(plain_text(name, f"{where}.revealed_by") for name in revealing)
         with placed(where):
             senses.append(ObjectSense(**{**fields, "revealed_by": actions}))
     return tuple(senses)

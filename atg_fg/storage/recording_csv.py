@@ -15,12 +15,14 @@ from typing import Final, NamedTuple
 
 from atg_fg.core.checks import brief, listed
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.core.recordings import RecordedLook, RecordedTrial
+from atg_fg.core.object_sense import GREATEST_READING, MOST_OBJECT_SENSES, ObjectSense
+from atg_fg.core.recordings import RecordedLook, RecordedTrial, Recording
 
 #: Columns that are no slots.
 FIXED: Final = ("trial", "step", "action", "object")
 _NEEDED: Final = FIXED[:3]
 _CONFIDENCE: Final = "confidence"
+_READING: Final = "reading"
 #: Characters of a field; a longer one is no label.
 _LONGEST: Final = 1000
 #: Digits of a step.
@@ -56,6 +58,7 @@ class CsvColumns(NamedTuple):
         label: Column of each slot's label, ``None`` of a slot with weights alone.
         confidence: Column of each slot's confidence, ``None`` without.
         weights: (column, label) of each slot's weights.
+        readings: (column, name) of each sense of the object.
         fixed: Column of trial, step, action and object.
         n_columns: Of a row.
     """
@@ -64,6 +67,7 @@ class CsvColumns(NamedTuple):
     label: tuple[int | None, ...]
     confidence: tuple[int | None, ...]
     weights: tuple[tuple[tuple[int, str], ...], ...]
+    readings: tuple[tuple[int, str], ...]
     fixed: dict[str, int]
     n_columns: int
 
@@ -71,7 +75,8 @@ class CsvColumns(NamedTuple):
 def columns_of(header: Sequence[str], slots: Sequence[str] | None = None) -> CsvColumns:
     """Return which column is what, by the names in the first line.
 
-    ``SLOT:confidence`` is how sure the detector was of a slot's label, ``SLOT=LABEL`` the likelihood of one label.
+    ``SLOT:confidence`` is how sure the detector was of a slot's label, ``SLOT=LABEL`` the likelihood of one label,
+    ``SENSE:reading`` a number that the object has whichever way it lies.
     Other columns than ``FIXED`` are slots. One named ``confidence`` belongs to the only other slot, if there is one.
 
     Args:
@@ -105,18 +110,27 @@ def columns_of(header: Sequence[str], slots: Sequence[str] | None = None) -> Csv
     for slot in owned:
         if slot not in number and not weights[slot]:
             raise InvalidInputError(f"line 1: no column for slot {slot!r} in {listed(names)}; expected one")
-    for name in names:
+    readings = []
+    for name, index in number.items():
         owner, colon, kind = name.partition(":")
-        if colon and "=" not in name and (kind != _CONFIDENCE or owner not in weights):
+        if colon and kind == _READING and owner and "=" not in owner and owner not in owned:
+            readings.append((index, owner))
+        elif colon and "=" not in name and (kind != _CONFIDENCE or owner not in weights):
             raise InvalidInputError(
-                f"line 1: column {brief(name)}; expected SLOT:confidence of a slot: {listed(owned)}"
+                f"line 1: column {brief(name)}; expected SLOT:confidence of a slot: {listed(owned)}; or SENSE:reading"
             )
+    if len(readings) > MOST_OBJECT_SENSES:
+        raise InvalidInputError(
+            f"line 1: {len(readings)} columns of readings, {listed([name for _, name in readings])}; "
+            f"expected at most {MOST_OBJECT_SENSES}"
+        )
     alone = number.get(_CONFIDENCE) if len(owned) == 1 and _CONFIDENCE not in owned else None
     return CsvColumns(
         tuple(owned),
         tuple(number.get(slot) for slot in owned),
         tuple(number.get(f"{slot}:{_CONFIDENCE}", alone) for slot in owned),
         tuple(tuple(weights[slot]) for slot in owned),
+        tuple(readings),
         {name: number[name] for name in FIXED if name in number},
         len(names),
     )
@@ -130,6 +144,7 @@ class CsvReader:
         slots: As for ``columns_of``.
         labels: Those that may occur, ``None`` for any.
         actions: Those that may occur, ``None`` for any.
+        senses: What is known of some senses of the object.
 
     Attributes:
         columns: Which is what.
@@ -142,6 +157,7 @@ class CsvReader:
         slots: Sequence[str] | None = None,
         labels: Sequence[str] | None = None,
         actions: Sequence[str] | None = None,
+        senses: Sequence[ObjectSense | str] = (),
     ) -> None:
         lines = text.removeprefix("\ufeff")
         first = lines.partition("\n")[0]
@@ -149,6 +165,7 @@ class CsvReader:
         self._rows = csv.reader(lines.split("\n"), delimiter=self._delimiter, strict=True)
         self._labels = None if labels is None else dict.fromkeys(sorted(labels))
         self._actions = None if actions is None else dict.fromkeys(sorted(actions))
+        self._relative = {each.name for each in senses if isinstance(each, ObjectSense) and each.relative}
         self.faults: list[Fault] = []
         self._is_fatal = False
         header = next(self._rows, None)
@@ -238,10 +255,24 @@ class CsvReader:
             elif given and not known and not label:
                 self._fault("no probability", line, slot, "all likelihoods are 0; expected one above 0, or nothing")
             weights.append(known if known and not label else None)
+        measured = tuple(
+            (name, value)
+            for column, name in columns.readings
+            if (text := row[column].strip()) and (value := self._reading(line, name, text)) is not None
+        )
         if any(weights):
-            return RecordedLook(tuple(labels), tuple(confidences), tuple(weights))
-        look = RecordedLook(tuple(labels), tuple(confidences))
+            return RecordedLook(tuple(labels), tuple(confidences), tuple(weights), measured)
+        look = RecordedLook(tuple(labels), tuple(confidences), (), measured)
         return self._looks.setdefault(look, look)
+
+    def _reading(self, line: int, name: str, text: str) -> float | None:
+        value, is_above = self._float(text), name in self._relative
+        # A NaN is in no range.
+        if abs(value) <= GREATEST_READING and (value > 0 or not is_above):
+            return value
+        what = f"{brief(text)}; expected a number{' above 0' * is_above}"
+        self._fault("no reading", line, f"{name}:{_READING}", what)
+        return None
 
     def _known(self, line: int, slot: str, label: str) -> str | None:
         if len(label) > _LONGEST:
@@ -265,14 +296,17 @@ class CsvReader:
 
     def _number(self, line: int, column: str, text: str, most: float) -> float | None:
         expected = f"expected a number from 0 to {most:g}" if math.isfinite(most) else "expected a number of at least 0"
-        try:
-            value = float(text.replace(",", ".") if self._delimiter != "," else text)
-        except ValueError:
-            value = math.nan
+        value = self._float(text)
         if not 0 <= value <= most or math.isinf(value):
             self._fault("no probability", line, column, f"{brief(text)}; {expected}")
             return None
         return value
+
+    def _float(self, text: str) -> float:
+        try:
+            return float(text.replace(",", ".") if self._delimiter != "," else text)
+        except ValueError:
+            return math.nan
 
     def _fault(self, kind: str, line: int, column: str, what: str, *, fatal: bool = True) -> None:
         place = f"line {line}, column {column!r}" if column else f"line {line}"
@@ -282,8 +316,9 @@ class CsvReader:
         self._is_fatal = self._is_fatal or fatal
 
 
-def write_csv(slots: Sequence[str], trials: Sequence[RecordedTrial]) -> str:
+def write_csv(recording: Recording) -> str:
     """Return trials as CSV: with confidences and the object where there are any, with weights by label if need be."""
+    slots, trials, senses = recording.slots, recording.trials, recording.sense_names
     by_label = {
         slot: sorted({name for trial in trials for look in trial.looks for name in _weights(look, index)})
         for index, slot in enumerate(slots)
@@ -293,7 +328,7 @@ def write_csv(slots: Sequence[str], trials: Sequence[RecordedTrial]) -> str:
     header = ["trial", "step", "action"]
     for slot in slots:
         header += [slot, *([f"{slot}:{_CONFIDENCE}"] if sure else []), *(f"{slot}={name}" for name in by_label[slot])]
-    lines = [header + (["object"] if named else [])]
+    lines = [header + [f"{name}:{_READING}" for name in senses] + (["object"] if named else [])]
     for trial in trials:
         for step, look in enumerate(trial.looks):
             row = [trial.name, str(step), trial.actions[step] if step < len(trial.actions) else ""]
@@ -303,6 +338,8 @@ def write_csv(slots: Sequence[str], trials: Sequence[RecordedTrial]) -> str:
                 row += ["" if stated is None else repr(stated)] if sure else []
                 weights = _weights(look, index)
                 row += [repr(weights[name]) if name in weights else "" for name in by_label[slot]]
+            readings = dict(look.measured)
+            row += [repr(readings[name]) if name in readings else "" for name in senses]
             lines.append(row + ([trial.object or ""] if named else []))
     return "".join(f"{','.join(map(_quoted, line))}\n" for line in lines)
 

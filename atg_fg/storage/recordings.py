@@ -1,27 +1,29 @@
 """Recordings of a user's own detector on disk (``atg-fg/recording``): CSV, or JSON lines with a header.
 
 Both say the same. A header, or a spec file beside a CSV, says what rows do not: slots, actions, labels, the number of
-objects and of aspects, and whether slots exclude each other.
+objects and of aspects, whether slots exclude each other, and what is known of senses of the object beforehand.
 """
 
 from __future__ import annotations
 
 import json
 from collections import Counter
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from atg_fg.core.checks import brief, listed, number, plain_text, whole_number
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.core.recordings import RecordedLook, RecordedTrial, Recording, used_labels
+from atg_fg.core.object_sense import GREATEST_READING, ObjectSense
+from atg_fg.core.patterns import Measured
+from atg_fg.core.recordings import RecordedLook, RecordedTrial, Recording, senses_of, used_labels
 from atg_fg.storage.checked_json import check_format, parse_json, read_list, read_object, without_none
+from atg_fg.storage.object_sense_json import read_object_senses, write_object_sense
 from atg_fg.storage.plain_files import read_text_file, write_bytes_atomically
 from atg_fg.storage.recording_csv import CsvReader, Fault, write_csv
+from atg_fg.storage.recording_oddities import oddities
 
 RECORDING_FORMAT: Final = "atg-fg/recording"
-#: Times that an action must have been done between two whole looks to be called still.
-_COMPARED: Final = 5
 
 
 class RecordingSpec(NamedTuple):
@@ -34,6 +36,7 @@ class RecordingSpec(NamedTuple):
         n_objects: |O|.
         n_aspects: |G|.
         exclusive: Whether a label is in one slot only.
+        senses: Of the object: what is known of each, or its name.
     """
 
     slots: tuple[str, ...] | None = None
@@ -42,9 +45,10 @@ class RecordingSpec(NamedTuple):
     n_objects: int | None = None
     n_aspects: int | None = None
     exclusive: bool | None = None
+    senses: tuple[ObjectSense | str, ...] | None = None
 
 
-_KEYS: Final = ("slots", "actions", "labels", "objects", "aspects", "exclusive")
+_KEYS: Final = ("slots", "actions", "labels", "objects", "aspects", "exclusive", "senses")
 
 
 def read_spec(path: Path | str) -> RecordingSpec:
@@ -73,8 +77,18 @@ def _spec(value: Any, place: str, keys: tuple[str, ...] = ()) -> RecordingSpec:
     if exclusive is not None and not isinstance(exclusive, bool):
         raise InvalidInputError(f"{place}: exclusive: {brief(exclusive)}; expected true or false")
     return RecordingSpec(
-        **names, n_objects=numbers.get("objects"), n_aspects=numbers.get("aspects"), exclusive=exclusive
+        **names,
+        n_objects=numbers.get("objects"),
+        n_aspects=numbers.get("aspects"),
+        exclusive=exclusive,
+        senses=_senses(fields["senses"], f"{place}: senses") if "senses" in fields else None,
     )
+
+
+def _senses(value: Any, place: str) -> tuple[ObjectSense | str, ...]:
+    entries = read_list(value, place)
+    known = iter(read_object_senses([each for each in entries if not isinstance(each, str)], place))
+    return tuple(plain_text(each, place) if isinstance(each, str) else next(known) for each in entries)
 
 
 def merged_spec(*specs: RecordingSpec) -> RecordingSpec:
@@ -129,7 +143,16 @@ def completed(recording: Recording, spec: RecordingSpec) -> Recording:
         for name in found:
             if known is not None and name not in known:
                 raise InvalidInputError(f"{recording.place}: {kind} {brief(name)}; expected one of: {listed(known)}")
-    return _made(recording.trials, spec._replace(slots=recording.slots), recording.labels, recording.place)
+    own = RecordingSpec(
+        recording.slots,
+        recording.actions,
+        recording.labels,
+        recording.n_objects,
+        recording.n_aspects,
+        recording.exclusive or None,
+        recording.senses,
+    )
+    return _made(recording.trials, merged_spec(spec, own), recording.labels, recording.place)
 
 
 def write_recording(recording: Recording, path: Path | str) -> None:
@@ -138,7 +161,7 @@ def write_recording(recording: Recording, path: Path | str) -> None:
     Raises:
         InvalidInputError: The file cannot be written.
     """
-    text = _to_lines(recording) if str(path).endswith(".jsonl") else write_csv(recording.slots, recording.trials)
+    text = _to_lines(recording) if str(path).endswith(".jsonl") else write_csv(recording)
     write_bytes_atomically(path, text.encode())
 
 
@@ -147,12 +170,19 @@ def _read(path: Path | str, spec: RecordingSpec) -> tuple[Recording, list[Fault]
     if text.lstrip("\ufeff \n").startswith("{"):
         return _of_lines(text, str(path), spec), []
     try:
-        reader = CsvReader(text, spec.slots, spec.labels, spec.actions)
+        reader = CsvReader(text, spec.slots, spec.labels, spec.actions, spec.senses or ())
         trials = reader.trials()
     except InvalidInputError as error:
         raise InvalidInputError(f"{path}: {error}") from error
     columns = [name for weights in reader.columns.weights for _, name in weights]
-    return _made(trials, spec._replace(slots=reader.columns.slots), columns, str(path)), reader.faults
+    senses = _with_found(spec.senses or (), [name for _, name in reader.columns.readings])
+    return _made(trials, spec._replace(slots=reader.columns.slots, senses=senses), columns, str(path)), reader.faults
+
+
+def _with_found(senses: Sequence[ObjectSense | str], found: Iterable[str]) -> tuple[ObjectSense | str, ...]:
+    """Return senses, and after them the names of those that were found and are not among them."""
+    by_name = {each if isinstance(each, str) else each.name: each for each in senses}
+    return tuple({**{name: name for name in found if name not in by_name}, **by_name}.values())
 
 
 def _made(trials: Sequence[RecordedTrial], spec: RecordingSpec, labels: Sequence[str], place: str) -> Recording:
@@ -167,6 +197,7 @@ def _made(trials: Sequence[RecordedTrial], spec: RecordingSpec, labels: Sequence
         spec.n_aspects,
         bool(spec.exclusive),
         place,
+        _with_found(spec.senses or (), senses_of(trials)),
     )
 
 
@@ -208,7 +239,7 @@ def recording_of(
 
 
 def _read_trial(value: Any, place: str, spec: RecordingSpec) -> RecordedTrial:
-    fields = read_object(value, place, ("trial", "actions", "looks"), ("object", "confidences"))
+    fields = read_object(value, place, ("trial", "actions", "looks"), ("object", "confidences", "measured"))
     slots = spec.slots or ()
     looks = read_list(fields["looks"], f"{place}: looks")
     actions = read_list(fields["actions"], f"{place}: actions")
@@ -223,9 +254,14 @@ def _read_trial(value: Any, place: str, spec: RecordingSpec) -> RecordedTrial:
     stated = read_list(fields.get("confidences", [[]] * len(looks)), f"{place}: confidences")
     if len(stated) != len(looks):
         raise InvalidInputError(f"{place}: confidences: {len(stated)} entries; expected {len(looks)}")
+    felt = read_list(fields.get("measured", [None] * len(looks)), f"{place}: measured")
+    if len(felt) != len(looks):
+        raise InvalidInputError(f"{place}: measured: {len(felt)} entries; expected {len(looks)}")
     made = tuple(
-        _read_look(look, sure, slots, f"{place}: look {index}", spec)
-        for index, (look, sure) in enumerate(zip(looks, stated, strict=True))
+        _read_look(look, sure, slots, f"{place}: look {index}", spec)._replace(
+            measured=_read_measured(readings, spec, f"{place}: look {index}: measured")
+        )
+        for index, (look, sure, readings) in enumerate(zip(looks, stated, felt, strict=True))
     )
     presented = fields.get("object")
     name = (
@@ -263,6 +299,18 @@ def _read_look(value: Any, sure: Any, slots: tuple[str, ...], place: str, spec: 
     return RecordedLook(tuple(labels), confidences, tuple(weights) if any(weights) else ())
 
 
+def _read_measured(value: Any, spec: RecordingSpec, place: str) -> Measured:
+    readings = {} if value is None else value
+    if not isinstance(readings, dict):
+        raise InvalidInputError(f"{place}: {brief(value)}; expected readings by name, or null")
+    known = {each.name: each for each in spec.senses or () if isinstance(each, ObjectSense)}
+    found = {
+        plain_text(name, place): number(reading, f"{place}: {name}", -GREATEST_READING, GREATEST_READING)
+        for name, reading in readings.items()
+    }
+    return tuple((name, known[name].check(value, place) if name in known else value) for name, value in found.items())
+
+
 def _to_lines(recording: Recording) -> str:
     lines = [header_of(recording), *map(trial_document, recording.trials)]
     return "".join(f"{json.dumps(line)}\n" for line in lines)
@@ -280,6 +328,8 @@ def header_of(recording: Recording) -> dict[str, Any]:
             "objects": recording.n_objects,
             "aspects": recording.n_aspects,
             "exclusive": recording.exclusive or None,
+            "senses": [each if isinstance(each, str) else write_object_sense(each) for each in recording.senses]
+            or None,
         }
     )
 
@@ -295,6 +345,7 @@ def trial_document(trial: RecordedTrial) -> dict[str, Any]:
     ]
     sure = any(value is not None for look in trial.looks for value in look.confidences)
     confidences = [list(look.confidences) for look in trial.looks] if sure else None
+    measured = [dict(look.measured) or None for look in trial.looks]
     return without_none(
         {
             "trial": trial.name,
@@ -302,48 +353,6 @@ def trial_document(trial: RecordedTrial) -> dict[str, Any]:
             "actions": list(trial.actions),
             "looks": looks,
             "confidences": confidences,
+            "measured": measured if any(measured) else None,
         }
     )
-
-
-def oddities(recording: Recording) -> Iterator[Fault]:
-    """Yield what no row shows by itself: what is recorded says little, or speaks against what is assumed."""
-    trials, everywhere = recording.trials, "all trials"
-    used = Counter(action for trial in trials for action in trial.actions if action)
-    if len(used) == 1:
-        yield _odd("one action", everywhere, f"{next(iter(used))!r} alone; expected several actions")
-    for action in recording.actions if len(recording.actions) > 1 else ():
-        if not used[action]:
-            yield _odd("unused action", everywhere, f"{action!r} is never done; expected it to occur")
-    for trial in trials:
-        if len(trial.looks) == 1:
-            yield _odd("one look", f"trial {trial.name}", "no action; expected several looks")
-        if not any(any(look.labels) or any(look.weights) for look in trial.looks):
-            yield _odd("nothing seen", f"trial {trial.name}", "nothing in any look; expected a label")
-    yield from _still_actions(recording, used)
-    soft = any(any(look.weights) for trial in trials for look in trial.looks)
-    for slot, name in enumerate(recording.slots):
-        labels = {look.labels[slot] for trial in trials for look in trial.looks} - {None}
-        if len(labels) < 2 and not soft:
-            yield _odd("one label", f"slot {name}", f"{len(labels)} labels; expected several")
-    objects = {trial.object for trial in trials if trial.object is not None}
-    if recording.n_objects is not None and len(objects) > recording.n_objects:
-        what = f"{len(objects)} objects are named; expected at most {recording.n_objects}"
-        yield _odd("more objects", "column 'object'", what)
-
-
-def _odd(kind: str, place: str, what: str) -> Fault:
-    return Fault(kind, place, what, fatal=False)
-
-
-def _still_actions(recording: Recording, used: Iterable[str]) -> Iterator[Fault]:
-    """Yield the actions after which the same is seen always: they tell nothing, or are not done."""
-    changed, compared = Counter[str](), Counter[str]()
-    for trial in recording.trials:
-        for before, action, after in zip(trial.looks, trial.actions, trial.looks[1:], strict=False):
-            if None not in before.labels and None not in after.labels:
-                compared[action] += 1
-                changed[action] += before.labels != after.labels
-    for action in used:
-        if compared[action] >= _COMPARED and not changed[action]:
-            yield _odd("still action", "all trials", f"{action!r} never changes what is seen; expected it to, at times")

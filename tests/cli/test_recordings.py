@@ -79,6 +79,46 @@ def test_an_empty_memory_is_begun_and_each_trial_learned_before_the_next(run, fo
     assert load_memory(folder / "robot.json").names
 
 
+def weighed(text, seed):
+    """Return a recording in which boxes 1 and 2 look like box 0, and only weigh something else."""
+    rng, weights = np.random.default_rng(seed), {"box-0": 0.3, "box-1": 0.6, "box-2": 1.2}
+    rows, turned = [row.split(",") for row in text.splitlines()], {}
+    header, twins = rows.pop(0), [row.copy() for row in rows if row[5] == "box-0"]
+    rows = [[f"{name}{row[0]}", *row[1:5], name] for name in weights for row in twins]
+    for row in rows:
+        row[4] = "" if row[1] == "0" else f"{weights[row[5]] * np.exp(rng.normal(0.0, 0.08)):.4f}"
+        turned.setdefault(row[0], []).append(",".join(row))
+    order = rng.permutation(len(turned))
+    shuffled = [row for number in order for row in list(turned.values())[number]]
+    return "\n".join([",".join([*header[:4], "weight:reading", "object"]), *shuffled]) + "\n"
+
+
+def test_boxes_that_look_alike_are_told_apart_by_weight(run, refused, folder):
+    (folder / "weighed.csv").write_text(weighed(cups(30, 1), 3))
+    usual = ("--preset", "default")
+    found = document(run, "recognise", "weighed.csv", "--memory", "robot.db", "--learn", "--objects", "3", *usual)
+    count = found["score"]["success"]
+    assert count["count"] >= 0.9 * count["of"]
+    first, second = found["trials"][0]["steps"][:2]
+    assert "measured" not in first
+    assert set(second["measured"]) == {"weight"}
+    memory = load_memory("robot.db")
+    assert sorted(round(graph.measured["weight"].total / graph.measured["weight"].count, 1) for graph in memory) == [
+        pytest.approx(np.log(weight), abs=0.1) for weight in (0.3, 0.6, 1.2)
+    ]
+    run("recordings", "convert", "weighed.csv", "-o", "weighed.jsonl", "--objects", "3")
+    again = document(run, "recognise", "weighed.jsonl", "--memory", "again.db", "--learn", *usual)
+    assert again["score"] == found["score"]
+    # Looks alone cannot tell them apart.
+    columns = [row.split(",") for row in (folder / "weighed.csv").read_text().splitlines()]
+    (folder / "seen.csv").write_text("\n".join(",".join([*row[:4], row[5]]) for row in columns) + "\n")
+    unfelt = document(run, "recognise", "seen.csv", "--memory", "seen.db", "--learn", "--objects", "3", *usual)
+    assert unfelt["score"]["success"]["count"] < count["count"]
+    assert document(run, "recognise", "seen.csv", "--memory", "robot.db", *usual)["score"] is not None
+    message = refused("recognise", "weighed.csv", "--memory", "seen.db")
+    assert "weighed.csv: readings of 'weight'; expected none, as the memory was begun without" in message
+
+
 def test_taught_objects_have_their_names(run, folder):
     document(run, "learn", "first.csv", "--memory", "robot.db", "--teach", "--objects", "3", "--aspects", "6")
     memory = load_memory(folder / "robot.db")

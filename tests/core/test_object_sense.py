@@ -57,6 +57,25 @@ def test_an_error_that_is_learned_goes_from_what_was_stated_to_what_readings_sca
     assert LENGTH.variance(many) == 0.25  # known
 
 
+def test_readings_alone_say_what_is_like_most_and_what_they_err_by() -> None:
+    rng = np.random.default_rng(0)
+    trials = [(weight * np.exp(rng.normal(0.0, 0.08, 9))).tolist() for weight in np.exp(rng.normal(-0.7, 0.6, 400))]
+    sense = ObjectSense.of_readings("weight", trials, ("flip",))
+    assert (sense.relative, sense.revealed_by, math.isinf(sense.worth)) == (True, ("flip",), False)
+    assert (math.log(sense.typical), sense.spread, sense.error) == pytest.approx((-0.7, 0.6, 0.08), abs=0.05)
+    shifted = ObjectSense.of_readings("weight", [[value - 1.0 for value in each] for each in trials])
+    assert not shifted.relative
+
+
+@pytest.mark.parametrize(
+    "trials", [[], [[]], [[0.5]], [[0.0, 0.0], [0.0]], [[0.3, 0.3], [0.3]], [[1e12], [1e-12, 1e-11]], [[-1e12, 1e12]]]
+)
+def test_few_readings_make_a_sense_that_is_sure_of_nothing(trials: list[list[float]]) -> None:
+    sense = ObjectSense.of_readings("weight", trials)
+    assert sense.spread >= 3 * sense.error
+    assert math.isfinite(sense.worth)
+
+
 def test_an_atg_keeps_its_readings_through_copies_and_merges() -> None:
     memory = RobotMemory(ASSUMED)
     for name, readings in (("one", [0.3, 0.31]), ("two", [0.6])):

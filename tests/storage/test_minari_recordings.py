@@ -12,12 +12,13 @@ from gymnasium import spaces
 from minari.data_collector import EpisodeBuffer
 
 from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.object_sense import ObjectSense
 from atg_fg.core.recordings import RecordedLook, RecordedTrial, Recording
 from atg_fg.storage.minari_recordings import read_minari, write_minari
 
 LOOKS = (
     RecordedLook(("logo", None), (0.9, None)),
-    RecordedLook((None, "lid"), (), (None, None)),
+    RecordedLook((None, "lid"), (), (None, None), (("weight", 0.25),)),
     RecordedLook((None, "lid"), (), ({"lid": 0.25, "logo": 0.5, "plain": 0.0}, None)),
 )
 RECORDING = Recording(
@@ -30,7 +31,9 @@ RECORDING = Recording(
     ),
     n_objects=4,
     n_aspects=3,
+    exclusive=True,
     place="looks.jsonl",
+    senses=(ObjectSense("size", 1.0, 1.0, 0.5), "weight"),
 )
 
 
@@ -52,6 +55,7 @@ def plainly(recording):
                         look.labels,
                         look.confidences if any(sure is not None for sure in look.confidences) else (),
                         look.weights if any(look.weights) else (),
+                        look.measured,
                     )
                     for look in trial.looks
                 )
@@ -81,6 +85,7 @@ def test_anyone_reads_looks_as_worlds_give_them(datasets):
     np.testing.assert_array_equal(first.infos["confidence"], [[0.9, np.nan], [np.nan, np.nan], [np.nan, np.nan]])
     np.testing.assert_array_equal(first.infos["likelihood"][2, 0], [0.25, 0.5, 0.0])
     assert np.isnan(first.infos["likelihood"][2, 1]).all()
+    np.testing.assert_array_equal(first.infos["measured"], [[np.nan, np.nan], [np.nan, 0.25], [np.nan, np.nan]])
     assert len(second) == 1
     assert json.loads(dataset.storage.metadata["atg_fg"])["labels"] == ["lid", "logo", "plain"]
 

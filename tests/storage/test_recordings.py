@@ -2,15 +2,18 @@
 
 import gzip
 import json
+import math
 import subprocess
 import sys
 import time
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.object_sense import ObjectSense
 from atg_fg.core.recordings import RecordedLook, RecordedTrial, Recording, used_labels
 from atg_fg.storage.recording_csv import MOST_FAULTS
 from atg_fg.storage.recordings import (
@@ -84,16 +87,79 @@ def test_columns_say_what_they_are(written):
     assert recording.slots == ("front", "top")
     assert recording.labels == ("a", "b", "x")
     first, second = recording.trials[0].looks
-    assert first == (("x", None), (0.5, None), (None, {"a": 0.7, "b": 0.3}))
+    assert first == (("x", None), (0.5, None), (None, {"a": 0.7, "b": 0.3}), ())
     assert second.labels == (None, None)
     assert not any(second.weights)
 
 
 def test_a_column_named_confidence_is_that_of_the_only_slot(written):
     text = "trial,step,action,label,confidence\n0,0,go,x,0.5\n0,1,,y,\n"
-    assert read_recording(written(text)).trials[0].looks[0] == (("x",), (0.5,), ())
+    assert read_recording(written(text)).trials[0].looks[0] == (("x",), (0.5,), (), ())
     two = read_recording(written(text.replace("label", "front")), RecordingSpec(slots=("front", "confidence")))
     assert two.trials[0].looks[0].labels == ("x", "0.5")
+
+
+WEIGHED = """trial,step,action,label,weight:reading,size:reading
+a,0,lift,logo,,0
+a,1,turn,text,0.5,
+a,2,,text,,
+b,0,turn,logo,,-1e-3
+b,1,,base,2,
+"""
+
+
+def test_a_column_of_readings_is_no_slot(written, tmp_path):
+    recording = read_recording(written(WEIGHED))
+    assert (recording.slots, recording.sense_names) == (("label",), ("weight", "size"))
+    measured = [[look.measured for look in trial.looks] for trial in recording.trials]
+    assert measured == [[(("size", 0.0),), (("weight", 0.5),), ()], [(("size", -0.001),), (("weight", 2.0),)]]
+    weight, size = recording.assumptions(2).object_senses
+    assert (weight.name, weight.relative, weight.revealed_by) == ("weight", True, ("lift",))
+    assert (weight.typical, weight.spread) == pytest.approx((1.0, math.log(2.0)))
+    assert (size.relative, size.revealed_by) == (False, ())
+    semicolons = written(WEIGHED.replace(",", ";").replace(".", ","), "semicolons.csv")
+    assert read_recording(semicolons).trials == recording.trials
+    for name in ("again.csv", "again.jsonl"):
+        write_recording(recording, tmp_path / name)
+        again = read_recording(tmp_path / name)
+        assert [[look.measured for look in trial.looks] for trial in again.trials] == measured
+        assert again.assumptions(2) == recording.assumptions(2)
+
+
+def test_what_is_known_of_a_sense_goes_before_what_its_readings_say(written, tmp_path):
+    known = {"name": "weight", "typical": 1.0, "spread": 0.6, "error": 0.1, "unit": "kg"}
+    spec = read_spec(written(json.dumps({"senses": [known, "age"]}), "spec.json"))
+    weight = ObjectSense("weight", 1.0, 0.6, 0.1, unit="kg")
+    recording = read_recording(written(WEIGHED), spec)
+    assert recording.senses == ("size", weight, "age")
+    write_recording(recording, tmp_path / "again.jsonl")
+    assert read_recording(tmp_path / "again.jsonl").senses == recording.senses
+    with pytest.raises(InvalidInputError, match="at most 2 of them"):
+        recording.assumptions(2)
+    assert weight in read_recording(written(WEIGHED), spec._replace(senses=(weight,))).assumptions(2).object_senses
+    with pytest.raises(InvalidInputError, match=r"line 3, column 'weight:reading': '-0\.5'; expected a number above 0"):
+        read_recording(written(WEIGHED.replace("text,0.5", "text,-0.5")), spec)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        (("0.5", "heavy"), "line 3, column 'weight:reading': 'heavy'; expected a number"),
+        (("0.5", "nan"), "line 3, column 'weight:reading': 'nan'; expected a number"),
+        (("0.5", "1e300"), "line 3, column 'weight:reading': '1e300'; expected a number"),
+        (
+            ("size:reading", "label:reading"),
+            "line 1: column 'label:reading'; expected SLOT:confidence .* SENSE:reading",
+        ),
+        (("size:reading", ":reading"), "line 1: column ':reading'; expected"),
+        (("size:reading", "size:readings"), "line 1: column 'size:readings'; expected"),
+        (("step,action,label", "step,action,age:reading"), "line 1: no slot in"),
+        (("trial,step,action,label", "trial,step,action,x=a,label:reading"), "line 1: 3 columns of readings"),
+    ],
+)
+def test_a_reading_that_is_none_is_one_line(written, change, message):
+    with pytest.raises(InvalidInputError, match=message):
+        read_recording(written(WEIGHED.replace(*change, 1)))
 
 
 def test_a_spec_says_what_rows_do_not(written):
@@ -204,6 +270,16 @@ def test_what_is_no_recording_is_refused(written, text, message):
         ({"trial": 0, "actions": [], "looks": [[{"x": 0}]]}, "expected a likelihood above 0"),
         ({"trial": 0, "actions": [], "looks": [["x"]], "confidences": [[2]]}, "look 0: confidences: 2; expected"),
         ({"trial": 0, "actions": [], "looks": [["x"]], "more": 1}, "unknown key 'more'"),
+        ({"trial": 0, "actions": [], "looks": [["x"]], "measured": []}, "measured: 0 entries; expected 1"),
+        (
+            {"trial": 0, "actions": [], "looks": [["x"]], "measured": [0.5]},
+            "look 0: measured: 0.5; expected readings by",
+        ),
+        ({"trial": 0, "actions": [], "looks": [["x"]], "measured": [{"w": "1"}]}, "look 0: measured: w: '1'; expected"),
+        (
+            {"trial": 0, "actions": [], "looks": [["x"]], "measured": [{"w": 1e99}]},
+            "look 0: measured: w: 1e.99; expected",
+        ),
     ],
 )
 def test_a_faulty_line_is_named(written, line, message):
@@ -279,6 +355,28 @@ def test_the_check_finds_what_no_row_shows_by_itself(written, kind, change):
     header, *rows = ODD.splitlines()
     text = "\n".join([header, *filter(None, map(change, rows))]) + "\n"
     assert kind in {fault.kind for fault in check_recording(written(text), SPEC)[1]}
+
+
+@pytest.mark.parametrize(
+    ("kind", "reading"),
+    [
+        ("one reading", lambda trial, step, error: 0.5),
+        ("copied readings", lambda trial, step, error: 0.5 + trial),
+        ("far reading", lambda trial, step, error: (0.5 + trial) * (1 + error) * (1000 if trial == step == 3 else 1)),
+        ("useless readings", lambda trial, step, error: 0.5 * (1 + error)),
+        (None, lambda trial, step, error: (0.5 + trial) * (1 + error)),
+    ],
+)
+def test_the_check_finds_readings_that_tell_no_object_from_another(written, kind, reading):
+    rng = np.random.default_rng(0)
+    rows = [
+        f"{trial},{step},{'' if step == 6 else ('tip', 'rotate')[step % 2]},{'abc'[(step + trial) % 3]},"
+        f"{reading(trial, step, rng.normal(0.0, 0.05))}"
+        for trial in range(8)
+        for step in range(7)
+    ]
+    found = check_recording(written("\n".join(["trial,step,action,label,weight:reading", *rows, ""])))[1]
+    assert [(fault.kind, fault.fatal) for fault in found] == ([] if kind is None else [(kind, False)])
 
 
 def test_of_many_faults_the_first_are_kept_and_the_first_fatal_one(written):
