@@ -5,7 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Iterable, Sequence
 from pathlib import Path
-from typing import Final, cast
+from typing import Final
 
 import numpy as np
 import pybullet
@@ -79,10 +79,8 @@ class RobotBody:
 
     def joint_states(self) -> Sequence[tuple[float, ...]]:
         """Return the arms' joint angles (rad), velocities (rad/s) and more of 14 joints as PyBullet has them."""
-        return cast(
-            Sequence[tuple[float, ...]],
-            pybullet.getJointStates(self.body, self.arm_joints, physicsClientId=self.client),
-        )
+        states: Sequence[tuple[float, ...]] = pybullet.getJointStates(self.body, self.arm_joints, self.client)
+        return states
 
     def state(self) -> tuple[FloatArray, FloatArray]:
         """Return the arms' joint angles (rad) and velocities (rad/s), each of shape [2, 7]."""

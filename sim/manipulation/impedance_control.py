@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from array import array
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Final
@@ -84,8 +83,8 @@ class ArmController:
 
     Attributes:
         exertion: How near the joints came to their limits.
-        on_motion: Called after each part of a motion with the angles (rad), speeds (rad/s) and torques (N·m) of its
-            steps, each of shape [steps, 2, 7].
+        on_motion: Called after each motion from rest to rest with the angles (rad), speeds (rad/s) and torques (N·m) of
+            its steps, each of shape [steps, 2, 7].
     """
 
     def __init__(self, robot: RobotBody, advance: Callable[[], None]) -> None:
@@ -108,15 +107,19 @@ class ArmController:
 
     def hold(self, seconds: float) -> None:
         """Stay where the arms are commanded to be."""
-        self._follow((_STIFFNESS * self.reference + self.feedforward)[None], round(seconds / TIME_STEP))
+        command = _STIFFNESS * self.reference + self.feedforward
+        self._follow(np.broadcast_to(command, (round(seconds / TIME_STEP), *command.shape)))
 
     def _sweep(self, targets: Sequence[JointTarget]) -> None:
         """Go through ``targets`` along cubic curves, from rest to rest."""
         angles = np.array([self.reference, *(target.angles for target in targets)])
         loads = np.array([self.feedforward, *(target.feedforward for target in targets)])
         seconds, slopes = self._timed(angles, np.array([target.seconds for target in targets]))
-        for leg, time in enumerate(seconds):
-            self._curve(angles[leg : leg + 2], slopes[leg], loads[leg : leg + 2], float(time))
+        legs = [
+            _commands(angles[leg : leg + 2], slopes[leg], loads[leg : leg + 2], float(time))
+            for leg, time in enumerate(seconds)
+        ]
+        self._follow(np.concatenate(legs))
         self.reference, self.feedforward = angles[-1], loads[-1]
 
     def _timed(self, angles: FloatArray, least: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -139,50 +142,46 @@ class ArmController:
         excess = float((peak / (_PEAK_SHARE * self.robot.velocity)).max())
         return seconds * max(1.0, excess), slopes
 
-    def _curve(self, ends: FloatArray, slopes: FloatArray, loads: FloatArray, seconds: float) -> None:
-        """Follow one cubic: angles and slopes (rad a leg) at its two ends, each of shape [2, 2, 7]."""
-        steps = max(1, round(seconds / TIME_STEP))
-        way = ends[1] - ends[0]
-        square, cube = _cubic(way, slopes[0], slopes[1])
-        part = np.minimum(1.0, (np.arange(0, steps, _STEPS_PER_REFERENCE) + _STEPS_PER_REFERENCE / 2) / steps)
-        part = part[:, None, None]
-        reference = ends[0] + part * (slopes[0] + part * (square + part * cube))
-        speed = (slopes[0] + part * (2 * square + 3 * part * cube)) / seconds
-        self._follow(_STIFFNESS * reference + _DAMPING * speed + loads[0] + part * (loads[1] - loads[0]), steps)
-
-    def _follow(self, commands: FloatArray, steps: int) -> None:
-        """Follow commands, the last one to the end: the torques that are wanted at angle zero and at rest.
+    def _follow(self, commands: FloatArray) -> None:
+        """Follow commands, one a step: the torques that are wanted at angle zero and at rest, [steps, 2, 7], N·m.
 
         Seven joints twice are too few for arrays to pay, so the law of control is written out in numbers.
-
-        Args:
-            commands: A row for every few steps, shape [rows, 2, 7], N·m.
-            steps: How many.
         """
-        rows = commands.reshape(len(commands), -1).tolist()
-        robot, advance = self.robot, self._advance
+        if not len(commands):
+            return
+        robot, advance, springs, dampers = self.robot, self._advance, self._springs, self._dampers
         most = robot.effort.ravel()
         least = float(most.min())
-        angles, velocities, torques = array("d"), array("d"), array("d")
-        for step in range(steps):
-            if step % _STEPS_PER_REFERENCE == 0 and step // _STEPS_PER_REFERENCE < len(rows):
-                command = rows[step // _STEPS_PER_REFERENCE]
-            states = robot.joint_states()
+        angles, velocities, torques = [], [], []
+        for command in commands.reshape(len(commands), -1).tolist():
+            turns, speeds, *_ = zip(*robot.joint_states(), strict=True)
             wanted = [
-                torque - spring * state[0] - damper * state[1]
-                for torque, spring, damper, state in zip(command, self._springs, self._dampers, states, strict=True)
+                torque - spring * turn - damper * speed
+                for torque, spring, damper, turn, speed in zip(command, springs, dampers, turns, speeds, strict=True)
             ]
             weak = max(wanted) > least or min(wanted) < -least
             robot.drive(np.clip(wanted, -most, most).tolist() if weak else wanted)
             advance()
-            angles.extend([state[0] for state in states])
-            velocities.extend([state[1] for state in states])
-            torques.extend(wanted)
-        if steps:
-            self.exertion.add(np.abs(velocities).reshape(steps, -1), np.abs(torques).reshape(steps, -1), robot)
-            if self.on_motion is not None:
-                applied = np.clip(np.reshape(torques, (steps, *robot.effort.shape)), -robot.effort, robot.effort)
-                self.on_motion(np.reshape(angles, applied.shape), np.reshape(velocities, applied.shape), applied)
+            angles.append(turns)
+            velocities.append(speeds)
+            torques.append(wanted)
+        self.exertion.add(np.abs(velocities), np.abs(torques), robot)
+        if self.on_motion is not None:
+            applied = np.clip(np.reshape(torques, commands.shape), -robot.effort, robot.effort)
+            self.on_motion(np.reshape(angles, applied.shape), np.reshape(velocities, applied.shape), applied)
+
+
+def _commands(ends: FloatArray, slopes: FloatArray, loads: FloatArray, seconds: float) -> FloatArray:
+    """Return what to follow along one cubic: angles and slopes (rad a leg) at its two ends, each of shape [2, 2, 7]."""
+    steps = max(1, round(seconds / TIME_STEP))
+    way = ends[1] - ends[0]
+    square, cube = _cubic(way, slopes[0], slopes[1])
+    part = np.minimum(1.0, (np.arange(0, steps, _STEPS_PER_REFERENCE) + _STEPS_PER_REFERENCE / 2) / steps)
+    part = part[:, None, None]
+    reference = ends[0] + part * (slopes[0] + part * (square + part * cube))
+    speed = (slopes[0] + part * (2 * square + 3 * part * cube)) / seconds
+    rows = _STIFFNESS * reference + _DAMPING * speed + loads[0] + part * (loads[1] - loads[0])
+    return np.repeat(rows, _STEPS_PER_REFERENCE, axis=0)[:steps]
 
 
 def _cubic(way: FloatArray, first: FloatArray, last: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -6,14 +6,16 @@ where the plan asks for it, the turn of the palm about that normal.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
 
 from atg_fg.core.patterns import FloatArray
-from sim.bodies.kinematics import ArmKinematics, HandPoses, cross
+from atg_fg.inference.kernels.compilation import compiled
+from sim.bodies.arm_kernels import Arms, Hands, crossed, dot, hands_at
+from sim.bodies.kinematics import ArmKinematics, HandPoses
 
 #: Metres that a radian of orientation counts for.
 _ORIENTATION_WEIGHT: Final = 0.25
@@ -64,20 +66,15 @@ class HandTask:
     cone: float
     palm: FloatArray | None = None
 
-    @cached_property
-    def across(self) -> FloatArray:
-        """What takes a hand's axis to its cross product with the normal, shape [2, 3, 3]."""
-        x, y, z = self.normal.T
-        matrix = np.zeros((len(self.normal), 3, 3))
-        matrix[:, 0, 1], matrix[:, 0, 2], matrix[:, 1, 2] = z, -y, x
-        return np.asarray(matrix - matrix.swapaxes(1, 2))
 
-    @cached_property
-    def palm_plane(self) -> FloatArray:
-        """Unit vectors in the face: where the palm shall point, and a quarter turn on about the normal, [2, 3, 2]."""
-        assert self.palm is not None
-        flat = self.palm - self.normal * np.vecdot(self.palm, self.normal)[:, None]
-        return np.stack([flat, cross(self.normal, self.palm)], axis=2)
+class _Task(NamedTuple):
+    """What hands have to do, as ``HandTask`` tells; where they do not turn, ``palm`` says nothing."""
+
+    pad: FloatArray
+    normal: FloatArray
+    palm: FloatArray
+    cone: float
+    turns: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -113,71 +110,122 @@ def solve(kinematics: ArmKinematics, task: HandTask, start: FloatArray, rest: Fl
         start: Joint angles to begin from, shape [2, 7], rad.
         rest: Posture preferred where the task leaves a choice, shape [2, 7], rad.
     """
+
+    def given(values: FloatArray) -> FloatArray:
+        return np.ascontiguousarray(values, float)
+
     lower, upper = kinematics.lower + _LIMIT_MARGIN, kinematics.upper - _LIMIT_MARGIN
-    angles = _within(start, lower, upper)
-    damping = _DAMPING**2 * np.eye(6 if task.palm is None else 7)
+    palm = task.normal if task.palm is None else task.palm
+    wanted = _Task(given(task.pad), given(task.normal), given(palm), task.cone, task.palm is not None)
+    angles, hands = _solved(kinematics.arms, given(lower), given(upper), wanted, given(start), given(rest))
+    lean, _, spin = _missed(hands, wanted)
+    miss = task.pad - hands.pad
+    outside = np.maximum(0.0, lean - task.cone)
+    return Solution(angles, np.sqrt(np.vecdot(miss, miss)), outside, np.abs(spin), HandPoses(*hands))
+
+
+@compiled
+def _missed(hands: Hands, task: _Task) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return by what hands miss a task.
+
+    They are the angle from each hand's axis to the normal, shape [arms], rad; the unit vector to turn about against it,
+    shape [arms, 3]; and how far each palm is turned off, shape [arms], rad, zero where the task leaves it free.
+    """
+    n_arms = len(hands.pad)
+    lean, direction, spin = np.empty(n_arms), np.empty((n_arms, 3)), np.zeros(n_arms)
+    for arm in range(n_arms):
+        axis, normal = hands.axis[arm], task.normal[arm]
+        across = crossed(axis, normal)
+        sine = math.sqrt(dot(across, across))
+        lean[arm] = math.atan2(sine, dot(axis, normal))
+        for row in range(3):
+            direction[arm, row] = across[row] / max(sine, 1e-9)
+        if task.turns:
+            wanted, palm = task.palm[arm], hands.palm[arm]
+            along = dot(palm, wanted) - dot(palm, normal) * dot(wanted, normal)
+            spin[arm] = math.atan2(-dot(palm, crossed(normal, wanted)), along)
+    return lean, direction, spin
+
+
+@compiled
+def _solved(
+    arms: Arms, lower: FloatArray, upper: FloatArray, task: _Task, start: FloatArray, rest: FloatArray
+) -> tuple[FloatArray, Hands]:
+    """Return joint angles near ``start`` that do a task, and where the hands are then.
+
+    All arms stop together.
+    """
+    angles = np.minimum(np.maximum(start, lower), upper)
+    n_arms, n_joints = angles.shape
+    n_rows = 7 if task.turns else 6
+    error, jacobian = np.empty((n_arms, n_rows)), np.empty((n_arms, n_rows, n_joints))
     least, idle = np.inf, 0
+    hands = hands_at(arms, angles)
     for _ in range(_MAX_ITERATIONS):
-        hands = kinematics.hands(angles)
-        error, jacobian = _residual(hands, task)
-        worst = float(np.abs(error).max())
+        _set_residual(hands, task, error, jacobian)
+        worst = np.abs(error).max()
         # Errors are cut at a reach, so nothing can be told of progress beyond it.
         idle = 0 if worst < (1 - _PROGRESS) * least or worst >= _LARGEST_REACH else idle + 1
         least = min(worst, least)
         if worst < _CLOSE_ENOUGH or idle == _PATIENCE:
-            return _solution(task, angles, hands)
-        pull = _REST_GAIN * (rest - angles)
-        square = jacobian @ jacobian.swapaxes(1, 2) + damping
-        # The task's own part, and of the pull towards rest what does not disturb the task.
-        weights = np.linalg.solve(square, error[..., None] - jacobian @ pull[..., None])
-        step = (jacobian.swapaxes(1, 2) @ weights)[..., 0] + pull
-        angles = _within(angles + _within(step, -_LARGEST_STEP, _LARGEST_STEP), lower, upper)
-    return _solution(task, angles, kinematics.hands(angles))
+            break
+        for arm in range(n_arms):
+            _take_step(jacobian[arm], error[arm], angles[arm], rest[arm], lower[arm], upper[arm])
+        hands = hands_at(arms, angles)
+    return angles, hands
 
 
-def _residual(hands: HandPoses, task: HandTask) -> tuple[FloatArray, FloatArray]:
-    """Return what is still to be done, shape [2, rows], and how the joints do it, shape [2, rows, 7]."""
-    n_arms, _, n_joints = hands.jacobian.shape
-    n_rows = 6 if task.palm is None else 7
-    error, jacobian = np.empty((n_arms, n_rows)), np.empty((n_arms, n_rows, n_joints))
-    to_go = task.pad - hands.pad
-    distance = np.sqrt(np.vecdot(to_go, to_go))
-    error[:, :3] = to_go * np.minimum(1.0, _LARGEST_REACH / np.maximum(distance, 1e-9))[:, None]
-    jacobian[:, :3] = hands.jacobian[:, :3]
-    lean, direction = _lean(hands.axis, task)
-    excess = np.maximum(0.0, lean - _CONE_SHARE * task.cone)
-    turning = _ORIENTATION_WEIGHT * hands.jacobian[:, 3:]
-    if excess.any():
-        error[:, 3:6] = direction * (_ORIENTATION_WEIGHT * excess)[:, None]
-        jacobian[:, 3:6] = turning * (excess > 0)[:, None, None]
-    else:
-        error[:, 3:6] = jacobian[:, 3:6] = 0.0
-    if task.palm is not None:
-        error[:, 6] = _ORIENTATION_WEIGHT * _within(_spin(hands.palm, task), -0.5, 0.5)
-        jacobian[:, 6:] = task.normal[:, None] @ turning
-    return error, jacobian
+@compiled
+def _set_residual(hands: Hands, task: _Task, error: FloatArray, jacobian: FloatArray) -> None:
+    """Set what is still to be done, shape [arms, rows], and how the joints do it, shape [arms, rows, joints]."""
+    lean, direction, spin = _missed(hands, task)
+    for arm in range(len(error)):
+        here, there = hands.pad[arm], task.pad[arm]
+        to_go = (there[0] - here[0], there[1] - here[1], there[2] - here[2])
+        share = min(1.0, _LARGEST_REACH / max(math.sqrt(dot(to_go, to_go)), 1e-9))
+        excess = max(0.0, lean[arm] - _CONE_SHARE * task.cone)
+        turning = _ORIENTATION_WEIGHT if excess > 0 else 0.0
+        for row in range(3):
+            error[arm, row], error[arm, 3 + row] = share * to_go[row], direction[arm, row] * (turning * excess)
+            for joint in range(jacobian.shape[2]):
+                jacobian[arm, row, joint] = hands.jacobian[arm, row, joint]
+                jacobian[arm, 3 + row, joint] = turning * hands.jacobian[arm, 3 + row, joint]
+        if task.turns:
+            error[arm, 6] = _ORIENTATION_WEIGHT * min(max(spin[arm], -0.5), 0.5)
+            for joint in range(jacobian.shape[2]):
+                jacobian[arm, 6, joint] = _ORIENTATION_WEIGHT * dot(task.normal[arm], hands.jacobian[arm, 3:, joint])
 
 
-def _within(values: FloatArray, lower: FloatArray | float, upper: FloatArray | float) -> FloatArray:
-    """Return ``np.clip``, which costs five times as much for so few values."""
-    return np.minimum(np.maximum(values, lower), upper)
-
-
-def _lean(axis: FloatArray, task: HandTask) -> tuple[FloatArray, FloatArray]:
-    """Return the angle from the hands' axes to the normals, shape [2], and the unit vector to turn about, [2, 3]."""
-    across = (task.across @ axis[..., None])[..., 0]
-    sine = np.sqrt(np.vecdot(across, across))
-    return np.arctan2(sine, np.vecdot(axis, task.normal)), across / np.maximum(sine, 1e-9)[:, None]
-
-
-def _spin(palm: FloatArray, task: HandTask) -> FloatArray:
-    """Return the angle about the normals from the palms to where they shall point, shape [2]."""
-    along, aside = (palm[:, None] @ task.palm_plane)[:, 0].T
-    return np.asarray(np.arctan2(-aside, along))
-
-
-def _solution(task: HandTask, angles: FloatArray, hands: HandPoses) -> Solution:
-    lean, _ = _lean(hands.axis, task)
-    spin = np.zeros(len(angles)) if task.palm is None else np.abs(_spin(hands.palm, task))
-    miss = task.pad - hands.pad
-    return Solution(angles, np.sqrt(np.vecdot(miss, miss)), np.maximum(0.0, lean - task.cone), spin, hands)
+@compiled
+def _take_step(
+    jacobian: FloatArray, error: FloatArray, angles: FloatArray, rest: FloatArray, lower: FloatArray, upper: FloatArray
+) -> None:
+    """Move an arm's angles by a step of damped least squares, and towards rest by what does not disturb the task."""
+    n_rows, n_joints = jacobian.shape
+    square, weights, pull = np.empty((n_rows, n_rows)), error.copy(), np.empty(n_joints)
+    for joint in range(n_joints):
+        pull[joint] = _REST_GAIN * (rest[joint] - angles[joint])
+    # Cholesky's factor of the damped square, a row after the other, and the right side with it.
+    for row in range(n_rows):
+        for joint in range(n_joints):
+            weights[row] -= jacobian[row, joint] * pull[joint]
+        for column in range(row + 1):
+            left = _DAMPING**2 if row == column else 0.0
+            for joint in range(n_joints):
+                left += jacobian[row, joint] * jacobian[column, joint]
+            for before in range(column):
+                left -= square[row, before] * square[column, before]
+            square[row, column] = math.sqrt(left) if row == column else left / square[column, column]
+        for before in range(row):
+            weights[row] -= square[row, before] * weights[before]
+        weights[row] /= square[row, row]
+    for row in range(n_rows - 1, -1, -1):
+        for after in range(row + 1, n_rows):
+            weights[row] -= square[after, row] * weights[after]
+        weights[row] /= square[row, row]
+    for joint in range(n_joints):
+        step = pull[joint]
+        for row in range(n_rows):
+            step += weights[row] * jacobian[row, joint]
+        moved = angles[joint] + min(max(step, -_LARGEST_STEP), _LARGEST_STEP)
+        angles[joint] = min(max(moved, lower[joint]), upper[joint])

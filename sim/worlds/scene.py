@@ -42,7 +42,7 @@ _GRAVITY: Final = 9.81  # m/s²
 
 
 _FLOOR_SIZE: Final = [4.0, 4.0, 0.01]  # half extents, m
-_FLOOR_HEIGHT, _OUT_OF_SIGHT = -0.51, 50.0  # m
+_FLOOR_HEIGHT, _OUT_OF_SIGHT = -0.51, [0.0, 0.0, 50.0]  # m
 _STEEL, _FLOOR = (0.45, 0.46, 0.48, 1.0), (0.80, 0.82, 0.84, 1.0)
 
 
@@ -108,17 +108,16 @@ class Scene:
         self.on_step: Callable[[], None] | None = None
         middle = (len(cubes) - 1) / 2
         self._origins = [np.array([0.0, STATION_SPACING * (middle - station), 0.0]) for station in range(len(cubes))]
-        # What is touched of the floor is not seen. What is seen of it, dear to draw, is out of the head's sight
-        # but when an observer looks.
-        touched = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=_FLOOR_SIZE, physicsClientId=self.client)
-        speck = pybullet.createVisualShape(pybullet.GEOM_SPHERE, radius=1e-4, physicsClientId=self.client)
-        pybullet.createMultiBody(0, touched, speck, [0.0, 0.0, _FLOOR_HEIGHT], physicsClientId=self.client)
-        self._floor = slab(self.client, _FLOOR_SIZE, [0.0, 0.0, _OUT_OF_SIGHT], _FLOOR, solid=False)
-        self.tables = [self._build_table(origin) for origin in self._origins]
+        # What is touched of the floor is not seen. What is seen of it and of the tables' feet, dear to draw, is out of
+        # the head's sight but when an observer looks.
+        self._scenery: list[tuple[int, list[float]]] = []
+        self._put_up(_FLOOR_SIZE, [0.0, 0.0, _FLOOR_HEIGHT], _FLOOR)
         self.cubes: list[CubeBody] = []
         for _ in cubes:
             like = self.cubes[0] if self.cubes else None
             self.cubes.append(CubeBody(self.client, circumstances.cube_mass, like, pictures))
+        # What a cube hides of its table is not drawn if the cube is drawn first.
+        self.tables = [self._build_table(origin) for origin in self._origins]
         self.robot = RobotBody(self.client, robot, STATION_SPACING * middle + _RAIL_SPARE if len(cubes) > 1 else None)
         if self.robot.rail is not None:
             self._draw_rails(STATION_SPACING * middle)
@@ -177,12 +176,12 @@ class Scene:
 
     @contextmanager
     def floor_in_sight(self) -> Iterator[None]:
-        """Let the floor be seen meanwhile."""
-        for height in (_FLOOR_HEIGHT, _OUT_OF_SIGHT):
-            pybullet.resetBasePositionAndOrientation(
-                self._floor, [0.0, 0.0, height], [0.0, 0.0, 0.0, 1.0], physicsClientId=self.client
-            )
-            if height == _FLOOR_HEIGHT:
+        """Let the floor and the tables' feet be seen meanwhile."""
+        for seen in (True, False):
+            for body, position in self._scenery:
+                place = position if seen else _OUT_OF_SIGHT
+                pybullet.resetBasePositionAndOrientation(body, place, [0.0, 0.0, 0.0, 1.0], physicsClientId=self.client)
+            if seen:
                 yield
 
     def close(self) -> None:
@@ -215,9 +214,15 @@ class Scene:
 
     def _build_table(self, origin: FloatArray) -> int:
         y = float(origin[1])
-        foot = [TABLE_MIDDLE, y, (TABLE_TOP - 0.54) / 2]
-        slab(self.client, [0.05, 0.05, (TABLE_TOP + 0.46) / 2], foot, _STEEL)
+        self._put_up([0.05, 0.05, (TABLE_TOP + 0.46) / 2], [TABLE_MIDDLE, y, (TABLE_TOP - 0.54) / 2], _STEEL)
         return table_top(self.client, y)
+
+    def _put_up(self, half_size: list[float], position: list[float], colour: tuple[float, ...]) -> None:
+        """Put up a box that is touched where it is, and seen there while an observer looks."""
+        touched = pybullet.createCollisionShape(pybullet.GEOM_BOX, halfExtents=half_size, physicsClientId=self.client)
+        speck = pybullet.createVisualShape(pybullet.GEOM_SPHERE, radius=1e-4, physicsClientId=self.client)
+        pybullet.createMultiBody(0, touched, speck, position, physicsClientId=self.client)
+        self._scenery.append((slab(self.client, half_size, _OUT_OF_SIGHT, colour, solid=False), position))
 
     def _draw_rails(self, reach: float) -> None:
         for x in _RAILS:
