@@ -76,7 +76,7 @@ def demo(
         def on_step(step: TrialStep) -> None:
             story.tell(step)
             if camera is not None:
-                camera.take()
+                camera.take(step)
 
         record = run_trial(
             made_world,
@@ -91,7 +91,7 @@ def demo(
         truth = None if novel else record.names[presented]
         console.print(f"truth:   {truth or 'a new object'}")
         header = {"engine": engine, "preset": preset, "world": world, "seed": seed}
-        lines = to_json_lines(record, camera.names if camera is not None else (), **header)
+        lines = to_json_lines(record, camera.taken if camera is not None else (), **header)
         _save(folder, made_world, record, memory, lines)
     saved = [str(path) for path in sorted(folder.iterdir())]
     console.print(f"saved:   {', '.join(saved)}")

@@ -100,12 +100,12 @@ def trial(
         def on_step(step: TrialStep) -> None:
             story.tell(step)
             if camera is not None:
-                camera.take()
+                camera.take(step)
 
         result = run_trial(made_world, inference, chosen_policy, actions, rng, on_step=on_step)
         story.verdict(result)
         story.mistakes(result.mistakes)
-        lines = to_json_lines(result, camera.names if camera is not None else (), **header)
+        lines = to_json_lines(result, camera.taken if camera is not None else (), **header)
         if record is not None:
             plain_files.write_bytes_atomically(record, lines.encode())
         about = {**header, "actions": actions, "cubes_seed": cubes_seed, "world_options": world_options}

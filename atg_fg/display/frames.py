@@ -1,7 +1,8 @@
 """The camera frames of a trial as pictures beside its record: what was seen at each look, with what was detected.
 
 A world with a camera offers ``camera_picture()``: its last frame with the detections drawn, RGB, shape
-[height, width, 3].
+[height, width, 3]. One that recognises objects by their looks offers ``crops``, too: what was cut out of that frame for
+each slot, RGB, shape [J, side, side, 3].
 """
 
 from __future__ import annotations
@@ -10,12 +11,14 @@ from pathlib import Path
 from typing import Any, Final
 
 from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.records import TrialStep
 from atg_fg.display import figures
 from atg_fg.storage import plain_files
 from atg_fg.worlds.base import World
 
 #: What a world with a camera offers.
 CAMERA_PICTURE: Final = "camera_picture"
+CROPS: Final = "crops"
 
 
 def has_camera(world: World) -> bool:
@@ -35,14 +38,14 @@ def camera_picture(world: World) -> Any:
 
 
 class FrameFolder:
-    """A folder beside a trial's record, named like it, with one PNG a look.
+    """A folder beside a trial's record, named like it, with a PNG of each look, and of each slot where there are crops.
 
     Args:
         record: Path of the record, ``trial.jsonl`` for the folder ``trial.frames``.
         world: The world of the trial.
 
     Attributes:
-        names: Path of each picture taken so far, from the record's folder; what the record says.
+        taken: What the record says of each look so far: paths of ``frame`` and ``crops``, from the record's folder.
 
     Raises:
         InvalidInputError: The world has no camera, or the folder cannot be written.
@@ -55,10 +58,20 @@ class FrameFolder:
             camera_picture(world)
         self._world = world
         self._folder = plain_files.make_folder(record.with_suffix(".frames"))
-        self.names: list[str] = []
+        self.taken: list[dict[str, Any]] = []
 
-    def take(self, _step: object = None) -> None:
-        """Save what the camera sees now; to be called at each look."""
-        name = f"look-{len(self.names):03}.png"
-        figures.save_image(camera_picture(self._world), self._folder / name)
-        self.names.append(f"{self._folder.name}/{name}")
+    def take(self, step: TrialStep) -> None:
+        """Save what the camera sees now, and crops where something was seen; to be called at each look."""
+        look = f"look-{len(self.taken):03}"
+        taken: dict[str, Any] = {"frame": self._save(camera_picture(self._world), look)}
+        if self._world.has_wrapper_attr(CROPS):
+            crops = self._world.get_wrapper_attr(CROPS)
+            taken["crops"] = [
+                None if symbol is None else self._save(crop, f"{look}-crop-{slot}")
+                for slot, (symbol, crop) in enumerate(zip(step.detection, crops, strict=True))
+            ]
+        self.taken.append(taken)
+
+    def _save(self, picture: Any, name: str) -> str:
+        figures.save_image(picture, self._folder / f"{name}.png")
+        return f"{self._folder.name}/{name}.png"

@@ -80,6 +80,7 @@ class TrialPage:
         graphs: The ATGs that the looks point at.
         goal: The symbols wanted, ``None`` where any will do, if there was a goal.
         notes: Sentences on what the robot made of the trial later, or of its looks in the end.
+        thumbnails: Crops that are drawn in place of symbols, as ``data:`` addresses.
     """
 
     title: str
@@ -90,6 +91,7 @@ class TrialPage:
     graphs: tuple[PlacedGraph, ...]
     goal: Detection | None = None
     notes: tuple[str, ...] = ()
+    thumbnails: Mapping[int, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -180,6 +182,8 @@ def _named(value: Any, alphabet: PatternAlphabet, field: str = "") -> Any:
         return value
     if field in ("seen", "shown", "goal"):
         return [None if symbol is None else alphabet.name_of(symbol) for symbol in value]
+    if field == "thumbnails":
+        return {alphabet.name_of(symbol): address for symbol, address in value.items()}
     if field == "aspects":
         return [list(map(alphabet.name_of, pattern)) for pattern in value]
     if isinstance(value, dict):

@@ -43,8 +43,11 @@ def looks_of(trial: TrialSummary, n_unseen: int | None) -> list[Look]:
 
 
 def _shown(truth: Mapping[str, Any]) -> tuple[int, ...] | None:
-    """Return the pattern that a world's truth says was shown, ``None`` if it says none."""
-    pattern = truth.get("pattern")
+    """Return the pattern that a world's truth says was shown, ``None`` if it says none.
+
+    Where a sense finds classes of appearance, the truth numbers pictures, and what was seen numbers classes.
+    """
+    pattern = None if truth.get("readings") else truth.get("pattern")
     if isinstance(pattern, (list, tuple)) and all(isinstance(symbol, int) for symbol in pattern):
         return tuple(pattern)
     return None

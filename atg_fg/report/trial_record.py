@@ -16,7 +16,7 @@ from atg_fg.core.memory import RobotMemory
 from atg_fg.core.records import StepSummary
 from atg_fg.report.content import Look, Named, Report, TrialPage, shown_parameters
 from atg_fg.report.kinds import told_kinds
-from atg_fg.report.pictures import data_address
+from atg_fg.report.pictures import data_address, thumbnails
 from atg_fg.report.summaries import look_of, told_mistakes, told_truth, told_verdict, with_graphs
 from atg_fg.storage.checked_json import check_format, parse_json, read_info, read_list, read_object
 from atg_fg.storage.memory_json import read_assumptions
@@ -81,6 +81,14 @@ def read_trial_record(text: str, path: Path, memory: RobotMemory | None) -> Repo
         looks=(),
         graphs=(),
         notes=told_mistakes(trial, assumptions),
+        thumbnails=thumbnails(
+            (
+                (read.observed, read.truth.get("confidences"), step.get("crops"))
+                for (read, _), step in zip(looks, steps, strict=True)
+            ),
+            path.parent,
+            str(path),
+        ),
     )
     page = with_graphs(page, [look for _, look in looks], memory, assumptions, trial.matched)
     notes = told_kinds(memory) if memory is not None or not names else (_NO_MEMORY,)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from atg_fg.core.records import TrialRecord
@@ -14,12 +14,12 @@ from atg_fg.storage.memory_json import write_assumptions
 TRIAL_FORMAT: Final = "atg-fg/trial"
 
 
-def to_json_lines(record: TrialRecord, frames: Sequence[str] = (), **header: Any) -> str:
+def to_json_lines(record: TrialRecord, pictures: Sequence[Mapping[str, Any]] = (), **header: Any) -> str:
     """Return the record as JSON lines: a header, a line a step, the verdict.
 
     Args:
         record: The trial.
-        frames: Path of the camera picture of each look, from the record's folder, if there are any.
+        pictures: Paths of ``frame`` and ``crops`` of each look, from the record's folder, if there are any.
         header: What else the header says.
     """
     assumptions = write_assumptions(record.assumptions)
@@ -27,8 +27,8 @@ def to_json_lines(record: TrialRecord, frames: Sequence[str] = (), **header: Any
         {"format": TRIAL_FORMAT, "version": 1, "objects": record.names, "assumptions": assumptions, **header}
     ]
     lines += [_step_line(record, time) for time in range(len(record.steps))]
-    for line, frame in zip(lines[1:], frames, strict=False):
-        line["frame"] = frame
+    for line, paths in zip(lines[1:], pictures, strict=False):
+        line.update(paths)
     verdict = {"outcome": record.verdict, "judged_novel": record.judged_novel, "matched": record.matched}
     mistakes = {"mistakes": [list(each) for each in record.mistakes]} if record.mistakes else {}
     lines.append({"verdict": {**verdict, **mistakes, "truth": record.lost_truth or record.steps[-1].truth}})

@@ -1,3 +1,4 @@
+import base64
 import json
 
 import numpy as np
@@ -5,6 +6,7 @@ import pytest
 
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.display.frames import FrameFolder, camera_picture, has_camera
+from atg_fg.report.reading import read_report
 from atg_fg.worlds.registry import make_world
 
 PNG = b"\x89PNG\r\n\x1a\n"
@@ -30,9 +32,29 @@ def test_pictures_are_what_the_camera_sees_with_the_detections_drawn(tmp_path):
     assert picture.shape == (240, 320, 3)
     assert (picture != world.get_wrapper_attr("frame")).any()
     folder = FrameFolder(tmp_path / "record.jsonl", world)
-    folder.take()
-    assert folder.names == ["record.frames/look-000.png"]
+    assert folder.taken == []
     world.close()
+
+
+def test_crops_of_what_was_seen_are_kept_and_stand_for_their_classes(run, tmp_path):
+    pytest.importorskip("cv2")
+    record = tmp_path / "trial.jsonl"
+    quick = ["--engine", "bayes-filter", "--actions", "3", "--missing", "0.3"]
+    assert run("trial", "--world", "picture-box", *quick, "--record", record, "--frames")[0] == 0
+    steps = [json.loads(line) for line in record.read_text().splitlines()[1:-1]]
+    assert [None in step["observed"] for step in steps] == [None in step["crops"] for step in steps]
+    assert any(None in step["crops"] for step in steps)
+    for look, step in enumerate(steps):
+        for slot, (symbol, crop) in enumerate(zip(step["observed"], step["crops"], strict=True)):
+            assert crop == (None if symbol is None else f"trial.frames/look-{look:03}-crop-{slot}.png")
+    (page,) = read_report(record).trials
+    assert set(page.thumbnails) == {symbol for step in steps for symbol in step["observed"]} - {None}
+    address = page.thumbnails[steps[0]["observed"][0]]
+    taken = [
+        base64.b64encode((tmp_path / crop).read_bytes()).decode() for step in steps for crop in step["crops"] if crop
+    ]
+    assert address.removeprefix("data:image/png;base64,") in taken
+    assert all(look.shown is None for look in page.looks)  # pictures have other numbers than classes
 
 
 def test_the_robots_camera_offers_the_same(tmp_path):

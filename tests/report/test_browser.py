@@ -1,5 +1,6 @@
 """The page in a browser: stepped through by keys, without a complaint on its console or a request to anywhere."""
 
+import base64
 import json
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from tests.report.chromium import Page, need_chromium
 from tests.report.conftest import NASTY
 from tests.report.test_crafted import long_trial
 
+PIXEL = "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
 RESULTS = Path(__file__).parents[2] / "results"
 
 pytestmark = pytest.mark.usefixtures("chromium")
@@ -119,6 +121,24 @@ def test_the_verdict_is_told_at_the_last_look_only(test_log, opened):
     assert page.ask(told).startswith(f"✓ rightThe robot says: {report.trials[number].verdict}. Truth: ")
     offered = page.ask("[...document.getElementById('trial').options].map((each) => each.textContent)")
     assert offered[number] == f"✓ trial {number}"
+
+
+def test_crops_are_drawn_in_place_of_symbols(trial, record, opened, tmp_path):
+    """One pixel stands for each symbol that was seen; those that are remembered alone keep their numbers."""
+    lines = [json.loads(line) for line in record.read_text().splitlines()]
+    (tmp_path / "pixel.png").write_bytes(base64.b64decode(PIXEL))
+    for line in lines[1:-1]:
+        line["crops"] = ["pixel.png" if slot == 0 else None for slot in range(2)]
+    record.write_text("".join(json.dumps(line) + "\n" for line in lines))
+    page = opened(record, trial[0])
+    page.press("End")
+    seen = {line["observed"][0] for line in lines[1:-1]}
+    images = page.ask("document.querySelectorAll('#graph image').length")
+    numbers = page.ask("[...document.querySelectorAll('#graph .symbol')].map((each) => Number(each.textContent))")
+    assert images > 0
+    assert numbers
+    assert seen.isdisjoint(numbers)
+    assert images + len(numbers) == 2 * page.ask("document.querySelectorAll('#graph title').length")
 
 
 def test_a_long_trial_is_drawn_with_few_dots(tmp_path, opened):

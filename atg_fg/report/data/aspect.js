@@ -3,6 +3,8 @@
 
 const SIDE = 0.78;
 const SHEAR = 0.42;
+// Crops to be drawn in place of symbols, by symbol.
+let pictures = {};
 
 function face(corners, extra = "") {
   return shape("polygon", { class: `face ${extra}`, points: corners.map((corner) => corner.join(",")).join(" ") });
@@ -14,6 +16,12 @@ function symbolAt(x, y, symbol) {
   return shape("text", { class: "symbol", x, y, ...fitted }, text);
 }
 
+// A symbol on a face, or the picture of it: of the unit square, by an affine map.
+function onFace(symbol, matrix, text) {
+  return Object.hasOwn(pictures, symbol) ? shape("image", { href: pictures[symbol], width: 1, height: 1,
+    preserveAspectRatio: "none", transform: `matrix(${matrix})` }) : text;
+}
+
 // The top of a cube is sheared to the right and up; y points downwards in an SVG.
 function cube(symbols) {
   const half = (SIDE * (1 + SHEAR)) / 2;
@@ -23,9 +31,10 @@ function cube(symbols) {
     face([[right, low], [right + deep, low - deep], [right + deep, high - deep], [right, high]], "side"),
     face([[left, low], [right, low], [right, high], [left, high]]),
     face([[left, high], [right, high], [right + deep, high - deep], [left + deep, high - deep]]),
-    symbolAt((left + right) / 2, (low + high) / 2, symbols[0]),
-    shape("g", { transform: `translate(${(left + right + deep) / 2} ${high - deep / 2}) scale(1 .72)` },
-      symbolAt(0, 0, symbols[1])),
+    onFace(symbols[0], [SIDE, 0, 0, SIDE, left, high], symbolAt((left + right) / 2, (low + high) / 2, symbols[0])),
+    onFace(symbols[1], [SIDE, 0, -deep, deep, left + deep, high - deep],
+      shape("g", { transform: `translate(${(left + right + deep) / 2} ${high - deep / 2}) scale(1 .72)` },
+        symbolAt(0, 0, symbols[1]))),
   ];
 }
 
@@ -36,7 +45,7 @@ function tiles(symbols, slots) {
     const [x, y] = [left + slot * side, -side / 2];
     return [
       face([[x, y], [x + side, y], [x + side, y + side], [x, y + side]]),
-      symbolAt(x + side / 2, 0, symbol),
+      onFace(symbol, [side, 0, 0, side, x, y], symbolAt(x + side / 2, 0, symbol)),
       shape("text", { class: "slot", x: x + side / 2, y: y - 0.06 }, slots[slot]),
     ];
   });

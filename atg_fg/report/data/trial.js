@@ -95,6 +95,7 @@ function looksTable() {
 
 function drawTrial(index) {
   trial = data.trials[index];
+  pictures = trial.thumbnails;
   show("legend", graphLegend(data, trial));
   show("looks", looksTable());
   show("notes", trial.notes.map((note) => element("li", {}, note)));
