@@ -16,7 +16,7 @@ from atg_fg.core.errors import TooLargeError
 from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.learning import kernels
 from atg_fg.learning.chain import Chain
-from atg_fg.learning.detector_noise import DetectorNoise
+from atg_fg.learning.detector_noise import ALONE_PRIOR, DetectorNoise
 from atg_fg.learning.milestones import is_milestone
 from atg_fg.learning.raw_trials import Recording
 from atg_fg.learning.register_search import search_registers
@@ -32,6 +32,8 @@ MAPS_WITHIN: Final = 12.0
 MAP_SWEEPS: Final = 5
 #: Trials from which on a map that is left alone is settled.
 SETTLED_TRIALS: Final = 3
+#: Unless more labels than this are wrong where the rest of their look is right: it is the maps then that err.
+EXPECTED_ALONE: Final = ALONE_PRIOR[0] / sum(ALONE_PRIOR)
 
 
 class Conclusion(NamedTuple):
@@ -183,15 +185,15 @@ class RegisterPopulation(Population):
         self.maps: list[SharedStructure] = []
 
     def advance(self, task: Task, names: IntArray, rng: np.random.Generator) -> Conclusion:
-        """Take in the last trial of a task; at milestones, search for other maps."""
-        predictive = []
+        """Take in the last trial of a task; at milestones, and after a rest, search for other maps."""
+        predictive, known = [], 0
         for chain in self.chains:
             known = len(chain.clusters.owner)
             chain.admit(task)
             if known == len(names) - 1:
                 predictive.append(chain.log_predictive(task))
             chain.place(task, np.arange(known, len(names)), rng)
-        if is_milestone(len(names)) or not self.chains:
+        if is_milestone(len(names)) or known < len(names) - 1:
             self._search(task, rng)
         samples: list[Samples] = []
         for chain in self.chains:
@@ -251,8 +253,8 @@ class RegisterPopulation(Population):
         """Have a chain for each of the best maps, of those at hand and those that a search proposes."""
         n_trials = len(task.recording.lengths)
         is_settled = n_trials > SETTLED_TRIALS and len(self.chains) == 1
-        if is_settled and n_trials.bit_count() > 1:
-            return  # what is far ahead of all else is looked at again when the trials have doubled
+        if is_settled and n_trials.bit_count() > 1 and task.alone <= EXPECTED_ALONE:
+            return  # as much as the detector errs, its errors are not the maps'
         trials = kernels.TrialArrays(task.looks, task.recording.actions, task.recording.lengths)
         nothing_else = np.full(n_trials, -np.inf)
         found = search_registers(trials, nothing_else, self._n_slots, self._n_actions, 1 if is_settled else 2, rng)

@@ -36,6 +36,7 @@ class Task(NamedTuple):
         log_partition: ln of the prior of a partition, by the number of objects.
         log_own: ln p(trial | a fresh object with an automaton of its own), shape [N]; empty where none may have one.
         right_looks: The likelihoods of looks that are not wrong as a whole, shape [N, T, J, V].
+        alone: Probability that a label is wrong though not all of its look is.
     """
 
     recording: Recording
@@ -44,6 +45,7 @@ class Task(NamedTuple):
     log_partition: FloatArray
     log_own: FloatArray
     right_looks: FloatArray = np.zeros((0, 0, 0, 0))
+    alone: float = 0.0
 
     @classmethod
     def of(cls, recording: Recording, noise: DetectorNoise, n_objects: int) -> Task:
@@ -59,4 +61,5 @@ class Task(NamedTuple):
             log_partition(n_objects, n_trials, n_trials + 3),
             np.zeros(0),
             noise.likelihoods(*seen, of_right_looks=True) * soft,
+            noise.alone,
         )
