@@ -74,17 +74,20 @@ class LearnedStructure(BayesFilter):
         super().__init__(setup)
         believed: list[BelievedStructure] = []
         rates = Rates()
-        if self.parameters.learn_structure and isinstance(self.memory, StructuredMemory):
-            believed, rates = self.memory.learner.believed(self.memory.names), self.memory.learner.rates
+        memory = self.memory if self.parameters.learn_structure else None
+        # Where looks err beyond doubt, nobody asks what there would be without.
+        if isinstance(memory, StructuredMemory) and memory.log_erring_weights[1] > -np.inf:
+            believed, rates = memory.learner.believed(memory.names), memory.learner.rates
         followers = [each.weight * np.append(each.followers, each.share) for each in believed]
         self._log_plain = log_of(np.maximum(1.0 - sum(followers, np.zeros(self.model.n_hypotheses)), 0.0))
         self._followed: list[FollowedStructure | FollowedChain | FollowedPlain] = [
             FollowedStructure(each, log_of(self.model.prior * follow), rates, self.memory)
             for each, follow in zip(believed, followers, strict=True)
         ]
-        if self.parameters.learn_structure and isinstance(self.memory, StructuredMemory):
-            self._follow_uncertain(self.memory, sum(followers, np.zeros(self.model.n_hypotheses)))
-            self._follow_chains(self.memory)
+        if isinstance(memory, StructuredMemory):
+            if memory.log_erring_weights[1] > -np.inf:
+                self._follow_uncertain(memory, sum(followers, np.zeros(self.model.n_hypotheses)))
+            self._follow_chains(memory)
 
     def _follow_uncertain(self, memory: StructuredMemory, followers: FloatArray) -> None:
         """Add the plain ATGs whose actions are uncertain, unless that is next to impossible of all objects."""

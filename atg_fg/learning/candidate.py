@@ -33,10 +33,9 @@ class Candidate:
         self.events: FloatArray = np.zeros((0, 4))
         self.contents: list[FloatArray] = []
 
-    def rescore(self, trials: Sequence[RawTrial], owners: Sequence[int], rates: Rates) -> None:
-        """Score all trials anew, and learn the contents of all objects anew; arguments as for ``catch_up``."""
+    def forget(self) -> None:
+        """Have all trials scored anew, and the contents of all objects learned anew."""
         self.log_evidence, self.events, self.contents = np.zeros(0), np.zeros((0, 4)), []
-        self.catch_up(trials, owners, rates)
 
     def catch_up(self, trials: Sequence[RawTrial], owners: Sequence[int], rates: Rates) -> None:
         """Score the trials that are not scored yet, and learn from them what their objects contain.

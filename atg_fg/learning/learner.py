@@ -88,24 +88,24 @@ class StructureLearner:
         self.noise = USUAL
         self._plain = PlainEvidence(assumptions)
         self._candidates: list[Candidate] = []
-        self._sets: list[KindSet] = []
+        self._chosen: list[KindSet] = []
+        self._n_chosen_from = -1
 
-    def learn(self, owner: str, trial: RawTrial, *, search: bool = True) -> None:
+    def learn(self, owner: str, trial: RawTrial, *, rests: bool = False) -> None:
         """Learn from one more trial.
 
         Args:
             owner: Name of its object.
             trial: What was seen and done.
-            search: Whether other structures may be searched for.
+            rests: Whether the trial is only kept: what it says of structures at hand is made out when it is asked for.
         """
         self._append(owner, trial)
-        if not self._can_explain:
+        if rests or not self._can_explain:
             return
         self._select()
         if is_milestone(len(self.trials)):
-            if search:
-                self._merge()
-            if search and self._is_worth_a_search():
+            self._merge()
+            if self._is_worth_a_search():
                 self._search()
             self._estimate_rates()
             self._select()
@@ -124,7 +124,6 @@ class StructureLearner:
             self._append(owner, trial)
         self.rates, self.noise = rates, noise
         self._candidates = [Candidate(structure, self.assumptions.alphabet) for structure in structures]
-        self._choose()
 
     def settle(self) -> None:
         """Keep the best of the structures at hand, best first, and estimate the rates: trials were put together."""
@@ -164,6 +163,13 @@ class StructureLearner:
     def candidates(self) -> tuple[SharedStructure, ...]:
         """Structures that are kept up, best first."""
         return tuple(candidate.structure for candidate in self._candidates)
+
+    @property
+    def _sets(self) -> list[KindSet]:
+        """The sets of kinds that explain all trials best."""
+        if self._n_chosen_from != len(self.trials):
+            self._choose()
+        return self._chosen
 
     @property
     def _can_explain(self) -> bool:
@@ -342,18 +348,22 @@ class StructureLearner:
 
     def _choose(self) -> None:
         """Choose the sets of kinds among the candidates."""
+        self._n_chosen_from = len(self.trials)
         if not self._can_explain:
             return
         self._plain.catch_up(self.trials, self.owners)
         for each in self._candidates:
             each.catch_up(self.trials, self._owner_indices, self.rates)
-        self._sets = choose_kinds(self._candidates, self._of_plain(), self.trials) if self.trials else []
+        self._chosen = choose_kinds(self._candidates, self._of_plain(), self.trials) if self.trials else []
 
     def _rescore(self) -> None:
         self._plain.forget()
+        self._forget_scores()
+
+    def _forget_scores(self) -> None:
         for candidate in self._candidates:
-            candidate.rescore(self.trials, self._owner_indices, self.rates)
-        self._choose()
+            candidate.forget()
+        self._n_chosen_from = -1
 
     def _estimate_noise(self) -> None:
         """Estimate α and δ of objects whose actions are uncertain."""
@@ -379,9 +389,7 @@ class StructureLearner:
             self.rates = Rates(self.rates.slip, self.rates.wrong, self.rates.repeat, estimated.share)
             return
         self.rates = estimated
-        for candidate in self._candidates:
-            candidate.rescore(self.trials, self._owner_indices, self.rates)
-        self._choose()
+        self._forget_scores()
 
 
 def _is_believable(structure: SharedStructure) -> bool:

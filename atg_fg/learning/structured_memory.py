@@ -118,11 +118,12 @@ class StructuredMemory(RobotMemory):
         trial = RawTrial(tuple(detections), tuple(actions), tuple(confidences), tuple(likelihoods), felt)
         trial.check(self.assumptions)
         before = self.gain if len(self.learner.trials) >= FIRST_TRIALS else 0.0
-        self.learner.learn(self[name].name, trial, search=before < OUTDONE)
         # A model that is far behind rests; it looks at all trials again whenever their number has doubled.
-        if before > -OUTDONE or len(self.learner.trials).bit_count() == 1:
+        has_doubled = (len(self.learner.trials) + 1).bit_count() == 1
+        self.learner.learn(self[name].name, trial, rests=before > OUTDONE and not has_doubled)
+        if before > -OUTDONE or has_doubled:
             self.evidence.learn()
-            self._gain = self._evident_gain()
+            self._weigh(anew=before <= OUTDONE or has_doubled)
             if self.erring and not taught:
                 self._mend()
         return self.learner.owners[-1]
@@ -157,9 +158,10 @@ class StructuredMemory(RobotMemory):
             name, alphabet = names[number], self.assumptions.alphabet
             patterns = [Evidence.of_detection(alphabet, each).pattern for each in trial.detections]
             self.learn(patterns, trial.actions, name if name in self.names else None, name, trial.measured)
-            self.learner.learn(name, trial, search=False)
+            self.learner.learn(name, trial, rests=True)
         self.evidence.learn()
-        self._gain = self._evident_gain()
+        n_trials = len(self.learner.trials)
+        self._weigh(anew=n_trials.bit_length() > (n_trials - len(trials)).bit_length())
         self._mend()
         return self.learner.owners[-len(trials) :]
 
@@ -294,14 +296,16 @@ class StructuredMemory(RobotMemory):
         # Trials that came in a file without what was sampled are not sampled before there is another one.
         return MISTAKEN if self.learner.trials else 0.0
 
-    def _evident_gain(self) -> float:
+    def _weigh(self, *, anew: bool) -> None:
+        """Weigh the models against each other, or, if not anew, see whether errors are a structure's mistakes."""
         if not self.assumptions.alphabet.exclusive:
-            return np.inf
-        if not self.learner.trials:
-            return 0.0
-        gain = self.evidence.log_evidence - self.learner.log_evidence
+            self._gain = np.inf
+            return
+        if anew:
+            self._gain = self.evidence.log_evidence - self.learner.log_evidence
         # However much it explains, it is not believed if its errors are the structure's and not the detector's.
-        return min(gain, MISTAKEN) if self.evidence.is_mistaken else gain
+        if self.evidence.is_mistaken:
+            self._gain = min(self.gain, MISTAKEN)
 
     def _merge_shared(self, keep: str, drop: str) -> tuple[int, ...]:
         trials = tuple(number for number, owner in enumerate(self.learner.owners) if owner == drop)

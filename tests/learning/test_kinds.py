@@ -53,7 +53,7 @@ def scored(structures, objects, seed=0, n_actions=10):
     trials = [trial_of(each, n_actions, rng) for each in objects]
     pool = [Candidate(structure, ARCUBES.alphabet) for structure in structures]
     for each in pool:
-        each.rescore(trials, range(len(trials)), Rates())
+        each.catch_up(trials, range(len(trials)), Rates())
     plain = PlainEvidence(ARCUBES)
     plain.catch_up(trials, list(map(str, range(len(trials)))))
     return pool, plain.of_kinds(USUAL), trials
@@ -82,7 +82,8 @@ def test_a_trial_that_errs_too_much_for_a_kind_is_none_of_it():
     for look in (2, 4, 6, 8):  # the slots of a look exchanged: what a planted fault in the camera would show
         spoiled[look] = spoiled[look][::-1]
     wrong = [RawTrial(tuple(spoiled), trials[0].actions)]
-    pool[0].rescore(wrong, [0], Rates())
+    pool[0].forget()
+    pool[0].catch_up(wrong, [0], Rates())
     assert kind_table(pool, plain, wrong)[0, N_PLAIN] <= plain[0].max() - 10
 
 
