@@ -305,7 +305,7 @@ class StructureLearner:
         for n_modes, n_draws in enumerate(N_DRAWS, start=1):
             for _ in range(n_draws):
                 drawn = [self.trials[number] for number in rng.permutation(unexplained)[:DRAWN].tolist()]
-                merged = [merge_states(drawn, each) for each in mode_automata(n_modes, len(self.assumptions.actions))]
+                merged = merge_states(drawn, mode_automata(n_modes, len(self.assumptions.actions)))
                 self.n_evaluations += len(merged)
                 for each in merged:
                     if each is not None and _is_believable(each.structure):

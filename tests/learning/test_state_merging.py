@@ -5,10 +5,15 @@ import pytest
 
 from atg_fg.learning.raw_trials import RawTrial
 from atg_fg.learning.shared_structure import is_permutation
-from atg_fg.learning.state_merging import merge_states, mode_automata
+from atg_fg.learning.state_merging import merge_states as merge_into
+from atg_fg.learning.state_merging import mode_automata
 from tests.learning.worlds import CUBE, PRISM, PRISM_MODES, RING, cubes, objects_of, prisms, random_objects, trial_of
 
 ONE_MODE = ((0, 0, 0),)
+
+
+def merge_states(trials, next_modes):
+    return merge_into(trials, [next_modes])[0]
 
 
 def trials_of(objects, seed=0, n_actions=10):
@@ -33,7 +38,8 @@ def test_small_rings_merge_into_the_ring():
 def test_trials_of_prisms_merge_into_the_prism_with_its_two_modes_alone(seed):
     trials = trials_of(prisms(12, seed), seed)
     assert merge_states(trials, ONE_MODE) is None
-    found = {modes: merged for modes in mode_automata(2, 3) if (merged := merge_states(trials, modes))}
+    automata = mode_automata(2, 3)
+    found = {modes: merged for modes, merged in zip(automata, merge_into(trials, automata), strict=True) if merged}
     assert list(found) == [PRISM_MODES]
     assert found[PRISM_MODES].structure == PRISM
     assert len(PRISM.poses().registers) == 24
@@ -41,10 +47,8 @@ def test_trials_of_prisms_merge_into_the_prism_with_its_two_modes_alone(seed):
 
 def test_objects_that_share_nothing_do_not_merge():
     trials = trials_of(random_objects(12, np.random.default_rng(0)))
-    for n_modes in (1, 2):
-        assert [merge_states(trials, modes) for modes in mode_automata(n_modes, 3)].count(None) == len(
-            mode_automata(n_modes, 3)
-        )
+    for automata in (mode_automata(1, 3), mode_automata(2, 3)):
+        assert merge_into(trials, automata) == [None] * len(automata)
 
 
 def test_a_trial_with_a_fault_is_left_out():
