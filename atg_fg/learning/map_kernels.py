@@ -11,6 +11,9 @@ from atg_fg.learning.kernels import (
     draw_by_logarithm,
 )
 
+#: Maps whose evidence a chain has at hand: a later one takes the place of an earlier one.
+_N_KNOWN = 4093
+
 
 @compiled
 def map_log_evidence(
@@ -28,10 +31,12 @@ def map_log_evidence(
         for time in range(trials.lengths[trial]):
             for slot in range(n_slots):
                 register = place[slot]
+                if not is_seen[register]:
+                    is_seen[register] = True
+                    for symbol in range(len(prior)):
+                        local[register, symbol] = prior[symbol]
                 for symbol in range(len(prior)):
-                    known = local[register, symbol] if is_seen[register] else prior[symbol]
-                    local[register, symbol] = known * trials.looks[trial, time, slot, symbol]
-                is_seen[register] = True
+                    local[register, symbol] *= trials.looks[trial, time, slot, symbol]
             if time + 1 < trials.lengths[trial]:
                 for register in range(n_registers):
                     moved[register] = place[sources[trials.actions[trial, time], register]]
@@ -76,6 +81,7 @@ def anneal_maps(
     best, kept = -np.inf, sources.copy()
     n_options = 2 * n_registers if copies else n_registers
     scores = np.empty(n_options)
+    scored, known = np.empty(_N_KNOWN), np.full((_N_KNOWN, n_actions, n_registers), -1)
     for beta in coldness:
         for action in range(n_actions):
             for register in rng.permutation(n_registers):
@@ -87,7 +93,19 @@ def anneal_maps(
                         sources[action, register], sources[action, other] = theirs, mine
                     else:
                         sources[action, register] = other
-                    scores[option] = map_log_evidence(trials, plain, sources, n_slots, prior)
+                    # Once a chain is cold, most maps that it looks at are those that it looked at before.
+                    key, is_known = 0, True
+                    for row in range(n_actions):
+                        for column in range(n_registers):
+                            key = key * 31 + sources[row, column]
+                    number = key % len(scored)
+                    for row in range(n_actions):
+                        for column in range(n_registers):
+                            is_known = is_known and known[number, row, column] == sources[row, column]
+                    if not is_known:
+                        known[number] = sources
+                        scored[number] = map_log_evidence(trials, plain, sources, n_slots, prior)
+                    scores[option] = scored[number]
                     if copies:
                         scores[option] -= copy_cost * count_losses(sources)
                     if scores[option] > best:
