@@ -25,7 +25,6 @@ from atg_fg.learning.register_contents import (
     TINY,
     distinctness,
     pattern_products,
-    reveal,
     reweigh,
     symbol_probabilities,
     unrevealed,
@@ -61,8 +60,8 @@ class Rows(NamedTuple):
         pose: Shape [R].
         weight: p(start, pose | owner, what was seen), shape [R].
         table: Index of the row's table of contents, shape [R]; rows that know the same share one.
-        events: Expected slips, wrong looks, repeated symbols and revealed registers so far, shape [R, 4]; rivals for
-            one trial do without.
+        events: Expected slips, wrong looks, repeated symbols and revealed registers so far, shape [R, 4]; those of
+            rivals for one trial do not count.
     """
 
     owner: IntArray
@@ -107,6 +106,9 @@ class PoseFilter:
         alphabet: PatternAlphabet,
         log_weights: FloatArray | None = None,
     ) -> None:
+        from atg_fg.learning import pose_kernels  # they load Numba
+
+        self._kernels = pose_kernels
         self._poses, self._rates, self._alphabet = poses, rates, alphabet
         self.log_weights = log_weights
         n_owners, n_poses = len(contents), len(poses.registers)
@@ -161,30 +163,28 @@ class PoseFilter:
     def observe_pattern(self, symbols: IntArray) -> None:
         """Take in looks that showed every slot, shape [J], or [H, J] for a look of each owner."""
         rows = self.rows
-        seen = np.broadcast_to(symbols, (len(self.log_evidence), symbols.shape[-1]))[rows.owner]
-        registers, shown = self._in_view(rows)
-        probability = self._possible[rows.pose] / distinctness(shown, self._alphabet.symbols)
-        index = np.arange(len(rows.owner))
-        for slot, probabilities in enumerate(shown):
-            probability *= probabilities[index, seen[:, slot]]
+        seen = np.array(np.broadcast_to(symbols, (len(self.log_evidence), symbols.shape[-1])))
+        in_view = self._in_view(rows)
+        probability = self._kernels.probability_of_look(
+            rows.owner, rows.table, in_view, self._possible[rows.pose], self._shown, seen
+        )
         kept, truth = self._condition(probability, np.ones(1))
         right = np.flatnonzero(truth > SAME)
-        source, tables = kept[right], self._contents[self.rows.table[right]]
-        seen, index = seen[source], np.arange(len(right))
-        known = np.ones(len(right), dtype=bool)
-        for slot, probabilities in enumerate(shown):
-            register, expected = registers[source, slot], probabilities[source]
-            before = tables[index, register]
-            known &= before[index, seen[:, slot]] > 1.0 - SAME
-            tables[index, register], revealed = reveal(before, expected, seen[:, slot], truth[right])
-            self._count_reveals(right, before, expected, revealed)
+        rows, in_view, truth = self.rows.take(right), in_view[kept[right]], truth[right]
+        tables = self._contents[rows.table]
+        index = np.arange(len(right))
+        # What shows nothing but what is known for certain leaves a table as it is.
+        known = (tables[index[:, None], in_view, seen[rows.owner]] > 1.0 - SAME).all(axis=1)
+        of, repeat = (rows.owner, rows.table), self._rates.repeat
+        self._kernels.reveal(tables, in_view, self._shown, of, seen, truth, rows.events, repeat)
+        self.rows.events[right] = rows.events
         self._merge(tables[~known], right[~known])
 
     def observe_likelihood(self, likelihood: FloatArray) -> None:
         """Take in any evidence as a likelihood of each pattern, shape [|𝒵|], or [H, |𝒵|] for a look of each owner."""
         rows, symbols = self.rows, self._alphabet.symbols
         likelihood = np.broadcast_to(likelihood, (len(self.log_evidence), len(symbols)))
-        registers, shown = self._in_view(rows)
+        registers, shown = self._in_view(rows), self._shown_in_view(rows)
         joint = pattern_products(shown, symbols) / distinctness(shown, symbols)[:, None]
         joint *= self._possible[rows.pose, None] * likelihood[rows.owner]
         probability = joint.sum(axis=1)
@@ -251,10 +251,13 @@ class PoseFilter:
         np.add.at(events, self.rows.owner, self.rows.weight[:, None] * self.rows.events)
         return events
 
-    def _in_view(self, rows: Rows) -> tuple[IntArray, list[FloatArray]]:
-        """Return the registers in the J slots, shape [R, J], and the symbols' probabilities in each, J × [R, S]."""
-        registers = self._poses.registers[rows.pose, : len(self._alphabet.slots)]
-        return registers, [self._shown[rows.table, register] for register in registers.T]
+    def _in_view(self, rows: Rows) -> IntArray:
+        """Return the register in each of the J slots, shape [R, J]."""
+        return np.ascontiguousarray(self._poses.registers[rows.pose, : len(self._alphabet.slots)])
+
+    def _shown_in_view(self, rows: Rows) -> list[FloatArray]:
+        """Return the probability of each symbol in each slot, J × [R, S]."""
+        return [self._shown[rows.table, register] for register in self._in_view(rows).T]
 
     def _condition(self, probability: FloatArray, scale: FloatArray) -> tuple[IntArray, FloatArray]:
         """Weigh the rows by a look, drop the negligible ones, and count how many looks were wrong.
@@ -266,16 +269,13 @@ class PoseFilter:
         Returns:
             Which rows are left, and how probable it is that the look was not wrong under each of them.
         """
-        rows, n_owners = self.rows, len(self.log_evidence)
-        right = (1.0 - self._rates.wrong) * probability
-        wrong = self._rates.wrong / len(self._alphabet) * np.broadcast_to(scale, n_owners)[rows.owner]
-        weight = rows.weight * (right + wrong)
-        total = np.bincount(rows.owner, weight, n_owners)
-        self.log_evidence += np.log(total, out=np.full(n_owners, -np.inf), where=total > 0)
-        weight = weight / np.maximum(total, np.finfo(float).tiny)[rows.owner]
-        kept = np.flatnonzero(weight * self._importance()[rows.owner] > NEGLIGIBLE)
-        truth = right[kept] / (right + wrong)[kept]
-        self.rows = rows._replace(weight=weight).take(kept)
+        wrong = self._rates.wrong / len(self._alphabet) * np.broadcast_to(scale, len(self.log_evidence))
+        likelihoods = (1.0 - self._rates.wrong) * probability, wrong
+        log_weights = np.zeros(0) if self.log_weights is None else self.log_weights
+        kept, truth, weight = self._kernels.weigh(
+            self.rows.owner, self.rows.weight, likelihoods, self.log_evidence, log_weights, NEGLIGIBLE
+        )
+        self.rows = self.rows.take(kept)._replace(weight=weight)
         self.rows.events[:, WRONG] += 1.0 - truth
         return kept, truth
 
@@ -313,33 +313,22 @@ class PoseFilter:
             changed: Index of the row that each belongs to, shape [I].
         """
         rows, n_old = self.rows, len(self._contents)
-        contents = [self._contents, tables]
         table = rows.table.copy()
         table[changed] = n_old + np.arange(len(changed))
         key = (rows.owner * len(self._poses.first) + rows.start) * len(self._poses.registers) + rows.pose
         order = np.argsort(key, kind="stable")
-        first, group = _runs(key[order])
-        weight = np.add.reduceat(rows.weight[order], first)
-        share = rows.weight[order] / np.maximum(weight, np.finfo(float).tiny)[group]
-        events = np.add.reduceat(rows.events[order] * share[:, None], first)
-        merged = np.minimum.reduceat(table[order], first)
-        mixed = merged != np.maximum.reduceat(table[order], first)
-        if mixed.any():
-            members = np.flatnonzero(mixed[group])
-            starts, _ = _runs(group[members])
-            own = np.concatenate(contents)[table[order[members]]]
-            contents.append(np.add.reduceat(own * share[members][:, None, None], starts))
-            merged[mixed] = n_old + len(changed) + np.arange(len(starts))
-        used, table = np.unique(merged, return_inverse=True)
-        self._contents = np.concatenate(contents)[used]
-        shown = symbol_probabilities(self._contents[used >= n_old], self._rates.repeat)
-        self._shown = np.concatenate((self._shown[used[used < n_old]], shown))
-        last = order[first]
+        contents = np.concatenate((self._contents, tables))
+        last, weight, table, events, self._contents, used = self._kernels.merge_rows(
+            order, key, rows.weight, table, rows.events, contents
+        )
+        old = used[used < n_old]
+        shown = symbol_probabilities(self._contents[len(old) :], self._rates.repeat)
+        self._shown = np.concatenate((self._shown[old], shown))
         self.rows = Rows(rows.owner[last], rows.start[last], rows.pose[last], weight, table, events)
 
     def _patterns_of(self, rows: Rows, weights: FloatArray, first: IntArray) -> FloatArray:
         """Return the weighted sum of what rows show, for each owner, shape [I, |𝒵|]."""
-        _, shown = self._in_view(rows)
+        shown = self._shown_in_view(rows)
         symbols = self._alphabet.symbols
         shown[0] = shown[0] * (weights * self._possible[rows.pose] / distinctness(shown, symbols))[:, None]
         combined = shown[0]

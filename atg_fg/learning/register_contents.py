@@ -69,32 +69,13 @@ def pattern_products(shown: Sequence[FloatArray], symbols: IntArray) -> FloatArr
     return product
 
 
-def reveal(known: FloatArray, shown: FloatArray, symbol: IntArray, truth: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return tables of one register after a look that showed its symbol, and what the look revealed.
-
-    Both are of shape [R, S]; the second is the probability that the register was unrevealed before, is so no longer,
-    and has a symbol.
-
-    Args:
-        known: C of the register before, shape [R, S].
-        shown: The probability of each of its symbols before, shape [R, S].
-        symbol: What was seen, shape [R].
-        truth: The probability that the look was not wrong, shape [R].
-    """
-    rows = np.arange(len(known))
-    changed = known * (1.0 - truth)[:, None]
-    changed[rows, symbol] += truth
-    revealed = np.zeros_like(known)
-    revealed[rows, symbol] = truth * (1.0 - known[rows, symbol] / np.maximum(shown[rows, symbol], TINY))
-    return changed, revealed
-
-
 def reweigh(
     known: FloatArray, shown: FloatArray, posterior: FloatArray, taken: FloatArray, truth: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Return tables of one register after evidence that did not show its symbol for certain, and what it revealed.
 
-    Both are as those of ``reveal``. The part of the evidence that is the same for all symbols says nothing about an
+    Both are of shape [R, S]; the second is the probability that the register was unrevealed before, is so no longer,
+    and has a symbol. The part of the evidence that is the same for all symbols says nothing about an
     unrevealed register, which stays so; what goes beyond it becomes known.
 
     Args:
