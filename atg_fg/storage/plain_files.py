@@ -8,6 +8,7 @@ nothing to replace.
 from __future__ import annotations
 
 import contextlib
+import errno
 import os
 import secrets
 import stat
@@ -36,7 +37,7 @@ GZIP: Final = b"\x1f\x8b"
 _TEMPORARY: Final = (".atg-fg-", ".tmp")
 
 
-#: Seconds in which someone must begin to write to a named pipe that is read; one that writes may take its time.
+#: Seconds in which someone must open the other end of a named pipe; who has it open may take their time.
 PIPE_WAIT: Final = 5.0
 
 
@@ -45,7 +46,7 @@ _PART: Final = 2**20
 _POLL: Final = 0.02
 
 
-#: Flag of opening that does not wait for a writer; Windows has neither.
+#: Flag of opening that does not wait for the other end; Windows has no such pipes.
 _NOT_WAITING: Final = getattr(os, "O_NONBLOCK", 0)
 
 
@@ -172,7 +173,8 @@ def write_bytes_atomically(path: Path | str, content: bytes) -> None:
     What is no plain file is written to in place.
 
     Raises:
-        InvalidInputError: The folder does not exist or cannot be written; the old file is as it was.
+        InvalidInputError: The folder does not exist or cannot be written, and the old file is as it was; or no one
+            reads from a named pipe within ``PIPE_WAIT`` seconds.
         BrokenPipeError: Whoever reads from a pipe has gone.
     """
     try:
@@ -184,8 +186,7 @@ def write_bytes_atomically(path: Path | str, content: bytes) -> None:
         if status is not None and stat.S_ISDIR(status.st_mode):
             raise _is_folder(path)
         if status is not None and not stat.S_ISREG(status.st_mode):
-            with open(path, "wb") as file:
-                file.write(content)
+            _write_in_place(path, content)
             return
         _replace(Path(os.path.realpath(path)), content, status)
     except BrokenPipeError:
@@ -301,6 +302,34 @@ def _write_to_descriptor(descriptor: int, content: bytes) -> None:
         if stream is not None:
             stream.flush()
     write_all(descriptor, content)
+
+
+def _write_in_place(path: Path | str, content: bytes) -> None:
+    """Write to a device or a named pipe.
+
+    Raises:
+        InvalidInputError: No one reads from the pipe within ``PIPE_WAIT`` seconds.
+    """
+    end = time.monotonic() + PIPE_WAIT
+    while True:
+        try:
+            descriptor = os.open(path, os.O_WRONLY | _NOT_WAITING)
+            break
+        except OSError as error:
+            if error.errno != errno.ENXIO or not stat.S_ISFIFO(os.stat(path).st_mode):
+                raise
+        if time.monotonic() > end:
+            raise InvalidInputError(
+                f"{path}: a pipe from which no one reads for {PIPE_WAIT:g} s; expected a file, or a pipe with a reader"
+            )
+        time.sleep(_POLL)
+    # A file object would write what is left once more when Ctrl-C ends it.
+    try:
+        if _NOT_WAITING:
+            os.set_blocking(descriptor, True)
+        write_all(descriptor, content)
+    finally:
+        os.close(descriptor)
 
 
 def write_all(descriptor: int, content: bytes) -> None:

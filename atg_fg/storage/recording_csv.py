@@ -162,7 +162,8 @@ class CsvReader:
         lines = text.removeprefix("\ufeff")
         first = lines.partition("\n")[0]
         self._delimiter = max(",;\t", key=first.count)
-        self._rows = csv.reader(lines.split("\n"), delimiter=self._delimiter, strict=True)
+        self._csv = csv.reader(lines.split("\n"), delimiter=self._delimiter, strict=True)
+        self._rows = self._checked_rows()
         self._labels = None if labels is None else dict.fromkeys(sorted(labels))
         self._actions = None if actions is None else dict.fromkeys(sorted(actions))
         self._relative = {each.name for each in senses if isinstance(each, ObjectSense) and each.relative}
@@ -192,18 +193,21 @@ class CsvReader:
             raise InvalidInputError("line 2: no rows; expected at least one look")
         return trials
 
-    def _numbered(self) -> Iterator[tuple[int, list[str]]]:
+    def _checked_rows(self) -> Iterator[list[str]]:
         try:
-            for row in self._rows:
-                line = self._rows.line_num
-                if not any(row):
-                    continue
-                if len(row) != self.columns.n_columns:
-                    self._fault("columns", line, "", f"{len(row)} columns; expected {self.columns.n_columns}")
-                    continue
-                yield line, row
+            yield from self._csv
         except csv.Error as error:
-            raise InvalidInputError(f"line {self._rows.line_num}: {error}; expected CSV") from error
+            raise InvalidInputError(f"line {self._csv.line_num}: {error}; expected CSV") from error
+
+    def _numbered(self) -> Iterator[tuple[int, list[str]]]:
+        for row in self._rows:
+            line = self._csv.line_num
+            if not any(row):
+                continue
+            if len(row) != self.columns.n_columns:
+                self._fault("columns", line, "", f"{len(row)} columns; expected {self.columns.n_columns}")
+                continue
+            yield line, row
 
     def _trial(self, name: str, rows: list[tuple[int, list[str]]]) -> RecordedTrial:
         fixed, actions, looks = self.columns.fixed, [], []

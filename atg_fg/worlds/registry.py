@@ -7,6 +7,7 @@ the truth, for scoring only.
 
 from __future__ import annotations
 
+import re
 from typing import Any, Final
 
 import gymnasium
@@ -47,6 +48,10 @@ _NOT_OPTIONS: Final = frozenset(
 )
 
 
+#: What Gymnasium adds to an error about options: all of them, objects too.
+_OF_GYMNASIUM: Final = " was raised from the environment creator"
+
+
 def make_world(name: str, /, **options: Any) -> World:
     """Return the world registered as ``name`` (or any ``module:namespace/Id-v0`` of a user's own).
 
@@ -71,8 +76,14 @@ def make_world(name: str, /, **options: Any) -> World:
         of_options = name in WORLDS or "unexpected keyword argument" in str(error)
         if isinstance(error, (TypeError, ValueError, OverflowError, AttributeError)) and not of_options:
             raise  # a fault of the world's own
-        what = "" if of_options else "; expected module:namespace/Id-v0, an id that the module registers"
-        raise InvalidInputError(f"world {name!r}: cannot be made: {error}{what}") from error
+        reason = str(error).partition(_OF_GYMNASIUM)[0]
+        unknown = re.search(r"unexpected keyword argument '(\w+)'", reason)
+        if unknown:
+            raise InvalidInputError(
+                f"world {name!r}: option {unknown[1]!r}: unknown; expected an option of the world's own"
+            ) from error
+        what = "options that it takes" if of_options else "module:namespace/Id-v0, an id that the module registers"
+        raise InvalidInputError(f"world {name!r}: cannot be made: {reason}; expected {what}") from error
 
 
 def make_world_with(name: str, n_objects: int, seed: int, /, **options: Any) -> World:

@@ -420,6 +420,12 @@ def test_a_gzipped_table_that_is_damaged_is_refused(written, change):
         read_recording(written(change(gzip.compress(PLAIN.encode()))))
 
 
+@pytest.mark.parametrize("rows", ['"trial"x,step', 'trial,step,action,seen\n"t"x,0,,cup', "x" * 200_000])
+def test_what_is_no_csv_is_refused_with_its_line_be_it_the_header_or_a_row(written, rows):
+    with pytest.raises(InvalidInputError, match=rf"looks\.csv: line {rows.count(chr(10)) + 1}: .*; expected CSV"):
+        read_recording(written(rows))
+
+
 class TestLargeInput:
     """No more time than the size explains, and no message that fills a screen."""
 

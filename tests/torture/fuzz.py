@@ -80,6 +80,8 @@ def fuzz(seconds: int, seed: int, *, keep: bool = False) -> dict[str, Any]:
             covered = max([covered, *map(int, re.findall(r"cov: (\d+)", output))])
             artifacts = [each for each in found.iterdir() if each.stat().st_size]
             if not artifacts:
+                if seconds - (time.monotonic() - begun) > _SECONDS:
+                    faults.append(f"ended early: {output[-300:]!r}")
                 break
             for artifact in artifacts:
                 said = re.findall(r"^(?:\w+Error|\w+Exception|ERROR|==\d+==).*$", output, re.MULTILINE)

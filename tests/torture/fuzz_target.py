@@ -33,5 +33,6 @@ def read_one(data: bytes) -> None:
 
 if __name__ == "__main__":
     warnings.simplefilter("ignore")
+    reading.warm_up(Path(_FOLDER.name))
     atheris.Setup(sys.argv, read_one)
     atheris.Fuzz()

@@ -90,6 +90,15 @@ def test_an_unknown_world_is_refused_with_the_names_there_are() -> None:
         make_world("no_such_module:moon/Moon-v0")
 
 
+@pytest.mark.parametrize("name", [name for name, place in WORLDS.items() if place.startswith("atg_fg")])
+def test_an_option_that_a_world_does_not_know_is_named_with_those_it_knows(name: str) -> None:
+    with pytest.raises(
+        InvalidInputError, match=f"^world '{name}': unknown option 'urdf'; expected one of: .+"
+    ) as error:
+        make_world_with(name, 100, 0, urdf="robot.urdf")
+    assert len(str(error.value)) < 400
+
+
 @pytest.mark.parametrize("name", [":", "a:b:c", ".:x", "..:y", "a:", ":x", "a b:c", "\0:x", "1:2", "atg_fg:atg_fg/A:B"])
 def test_a_name_of_no_form_is_refused_before_anything_is_imported(name: str) -> None:
     with pytest.raises(InvalidInputError, match="cannot be made"):
