@@ -91,12 +91,10 @@ def test_an_unknown_world_is_refused_with_the_names_there_are() -> None:
 
 
 @pytest.mark.parametrize("name", [name for name, place in WORLDS.items() if place.startswith("atg_fg")])
-def test_an_option_that_a_world_does_not_know_is_named_with_those_it_knows(name: str) -> None:
-    with pytest.raises(
-        InvalidInputError, match=f"^world '{name}': unknown option 'urdf'; expected one of: .+"
-    ) as error:
+def test_an_option_that_a_world_does_not_know_is_named_and_no_other(name: str) -> None:
+    with pytest.raises(InvalidInputError) as error:
         make_world_with(name, 100, 0, urdf="robot.urdf")
-    assert len(str(error.value)) < 400
+    assert str(error.value) == f"world {name!r}: option 'urdf': unknown; expected an option of the world's own"
 
 
 @pytest.mark.parametrize("name", [":", "a:b:c", ".:x", "..:y", "a:", ":x", "a b:c", "\0:x", "1:2", "atg_fg:atg_fg/A:B"])
