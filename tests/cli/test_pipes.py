@@ -1,8 +1,12 @@
-"""What comes through a pipe is read as a file is, where a shell makes a path of a process."""
+"""Pipes in place of files: what comes through one is read as a file is, and no one waits for ever at an end of one."""
 
+import fcntl
 import os
+import stat
+import struct
 import subprocess
 import sys
+import termios
 import threading
 import time
 
@@ -10,6 +14,10 @@ import pytest
 
 from atg_fg.storage import plain_files
 from tests.cli.conftest import refused as refused  # a fixture
+from tests.cli.test_endings import begin, interrupted
+from tests.cli.test_paths import PATHS, arguments
+from tests.dask_cluster import wait_for
+from tests.torture import commands
 from tests.torture.originals import originals
 
 #: Commands, with the file that comes through a pipe in place of each {}, by kind.
@@ -77,3 +85,71 @@ def test_one_who_writes_to_a_pipe_may_take_their_time(tmp_path, monkeypatch):
     writer.start()
     assert plain_files.read_bytes_file(pipe) == content
     writer.join(10)
+
+
+#: Each command that writes, with each of the files that it makes.
+MADE = [
+    (command.words, word[1:])
+    for command in commands.COMMANDS
+    for word in command.words.split()
+    if word.startswith("@") and word[1:] not in commands.FILES
+]
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes")
+class TestPipeThatNoOneReads:
+    @pytest.mark.slow
+    @pytest.mark.parametrize(("words", "made"), MADE, ids=str)
+    def test_each_output_of_each_command_is_given_up(self, tmp_path, monkeypatch, words, made):
+        monkeypatch.setattr(plain_files, "PIPE_WAIT", 0.1)
+        pipe = commands.prepared(tmp_path / "work") / made
+        os.mkfifo(pipe)
+        begun = time.monotonic()
+        status, error = commands.run(words, pipe.parent)
+        assert time.monotonic() - begun < 60
+        assert (status, error.count("\n")) == (2, 1)
+        assert f"{pipe}: " in error
+        assert "; expected " in error
+        assert stat.S_ISFIFO(pipe.stat().st_mode)
+        assert not [path for path in pipe.parent.iterdir() if path.name.startswith(".")]
+
+    def test_the_one_line_says_how_long_a_reader_was_waited_for(self, tmp_path, monkeypatch, refused):
+        monkeypatch.setattr(plain_files, "PIPE_WAIT", 0.1)
+        os.mkfifo(tmp_path / "pipe")
+        error = refused("memory", "example", tmp_path / "pipe")
+        assert "pipe: a pipe from which no one reads for 0.1 s; expected a file, or a pipe with a reader" in error
+
+    def test_a_reader_may_come_a_little_later(self, tmp_path):
+        os.mkfifo(tmp_path / "pipe")
+        writer = threading.Thread(target=plain_files.write_bytes_atomically, args=(tmp_path / "pipe", b"x" * 10**6))
+        writer.start()
+        time.sleep(0.2)
+        assert (tmp_path / "pipe").read_bytes() == b"x" * 10**6
+        writer.join(10)
+
+    @pytest.mark.skipif(sys.platform != "linux", reason="asks how full a pipe is")
+    def test_ctrl_c_ends_a_command_whose_reader_does_not_read(self, tmp_path):
+        os.mkfifo(tmp_path / "pipe")
+        reader = os.open(tmp_path / "pipe", os.O_RDONLY | os.O_NONBLOCK)
+        fcntl.fcntl(reader, fcntl.F_SETPIPE_SZ, 4096)  # less than a memory
+        process = begin("memory", "example", tmp_path / "pipe", stdout=subprocess.DEVNULL)
+
+        def is_full():
+            return struct.unpack("i", fcntl.ioctl(reader, termios.FIONREAD, bytes(4)))[0] > 0
+
+        wait_for(is_full)
+        assert interrupted(process) == (130, "")
+        os.close(reader)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes")
+@pytest.mark.parametrize(
+    ("name", "path"), [(name, path.name) for name, paths in PATHS.items() for path in paths if not path.written]
+)
+def test_no_input_of_a_command_is_waited_for(tmp_path, monkeypatch, refused, name, path):
+    monkeypatch.setattr(plain_files, "PIPE_WAIT", 0.1)
+    os.mkfifo(tmp_path / "pipe")
+    begun = time.monotonic()
+    refused(*arguments(name, **{path: tmp_path / "pipe"}))
+    assert time.monotonic() - begun < 60

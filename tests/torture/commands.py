@@ -12,7 +12,7 @@ import shutil
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Final, NamedTuple, Protocol
 
 from atg_fg import cli
 from atg_fg.core.errors import AtgError
@@ -24,6 +24,20 @@ from atg_fg.storage.packaged import example_memory
 from atg_fg.storage.trial_log import to_line
 from tests.torture.originals import originals
 
+#: Files that there are before a command begins: those of a kind of the originals, and two more.
+_KINDS: Final = {
+    "memory.json": "memory",
+    "structured.json": "structured memory",
+    "robot.db": "database",
+    "script.json": "script",
+    "model.uai": "UAI model",
+    "record.jsonl": "trial record",
+    "test.jsonl.gz": "test log",
+    "counts.json": "counts",
+    "looks.csv": "recorded table",
+    "tag.png": "picture",
+}
+FILES: Final = frozenset({*_KINDS, "example.json", "plain.json"})
 #: Bytes that are left on the disk when a command begins.
 LEFT = (0, 4096, 20_480, 69_632)
 
@@ -67,7 +81,12 @@ COMMANDS = (
         "--resume",
     ),
     Command("rescore @test.jsonl.gz --preset default --json @j.json"),
-    Command("replay @script.json"),
+    Command("learn @looks.csv --memory @m.json --objects 4 --json @j.json"),
+    Command("learn @looks.csv --memory @m.db --objects 4 --json @j.json"),
+    Command("recognise @looks.csv --memory @m.json --objects 4 --learn --report @page.html --json @j.json"),
+    Command("recordings check @looks.csv --json @j.json"),
+    Command("recordings convert @looks.csv --output @looks.jsonl --objects 4"),
+    Command("recordings simulate --output @made.csv --trials 4 --actions 2"),
     Command("explain @script.json --json @j.json"),
     Command("uai export @script.json --model @m.uai --evidence @e.evid"),
     Command("uai solve @model.uai --task MAR --json @j.json"),
@@ -80,6 +99,8 @@ COMMANDS = (
     Command("memory import @test.jsonl.gz @plain.json --into @into.db"),
     Command("memory merge @plain.json @robot.db -o @union.json"),
     Command("memory merge @plain.json @robot.db -o @union.db"),
+    Command("memory diff @plain.json @structured.json --json @j.json"),
+    Command("memory repair @robot.db --json @j.json"),
     Command("memory compact @plain.json --output @m.npz --json @j.json"),
     Command("memory duplicates @memory.json --merge --json @j.json"),
     Command("memory unmerge @memory.json object-003"),
@@ -87,6 +108,9 @@ COMMANDS = (
     Command("memory structure @example.json --plot @plot.png --json @j.json"),
     Command("sim calibrate @counts.json --output @preset.json --json @j.json"),
     Command("print board -o @board.pdf"),
+    Command("print cube --cubes 1 -o @cube.pdf --json @j.json"),
+    Command("look @tag.png --dictionary 5X5_50 --draw @seen --json @j.json"),
+    Command("engines check --engine bayes-filter --trials 2 --json @j.json"),
     Command("demo --world ideal --actions 1 --engine bayes-filter --output @out --json @j.json"),
 )
 
@@ -96,7 +120,7 @@ def command_outcomes(disk: Disk, n_points: int, n_commands: int | None = None) -
     for command in COMMANDS[:n_commands]:
         name = " ".join(command.words.split()[: 1 + (command.words.split()[0] in cli_groups())])
         folder = disk.folder / "work"
-        status, error = _run(command.words, _prepared(folder))
+        status, error = run(command.words, prepared(folder))
         if status not in (0, 1):
             yield name, f"cannot be run at all: {error}"
             continue
@@ -109,23 +133,15 @@ def command_outcomes(disk: Disk, n_points: int, n_commands: int | None = None) -
 
 def cli_groups() -> tuple[str, ...]:
     """The words after which another one follows."""
-    return "memory", "uai", "sim", "print"
+    return "memory", "uai", "sim", "print", "recordings", "engines"
 
 
-def _prepared(folder: Path) -> Path:
+def prepared(folder: Path) -> Path:
+    """Make a folder anew with all files that the commands read, and return it."""
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir()
     sound = originals()
-    for name, kind in {
-        "memory.json": "memory",
-        "structured.json": "structured memory",
-        "robot.db": "database",
-        "script.json": "script",
-        "model.uai": "UAI model",
-        "record.jsonl": "trial record",
-        "test.jsonl.gz": "test log",
-        "counts.json": "counts",
-    }.items():
+    for name, kind in _KINDS.items():
         (folder / name).write_bytes(sound[kind][0])
     document = json.loads(sound["memory"][0])
     document.pop("merges", None)
@@ -135,10 +151,10 @@ def _prepared(folder: Path) -> Path:
 
 
 def _fault(command: Command, disk: Disk, left: int, reference: dict[str, Any]) -> str | None:
-    folder = _prepared(disk.folder / "work")
+    folder = prepared(disk.folder / "work")
     before = _snapshot(folder)
     with disk.full(left):
-        status, error = _run(command.words, folder)
+        status, error = run(command.words, folder)
     after = _snapshot(folder)
     if "Traceback" in error or status not in (0, 1, 2):
         return f"status {status}: {error[-300:]}"
@@ -148,7 +164,7 @@ def _fault(command: Command, disk: Disk, left: int, reference: dict[str, Any]) -
         for name, content in after.items():
             if content != before.get(name) and not _is_part(content, reference.get(name)):
                 return f"{name} is neither as it was nor as it should be"
-        status, error = _run(f"{command.words} {command.again}", folder)
+        status, error = run(f"{command.words} {command.again}", folder)
         if status == 2 and "already there" in error:  # whole, as was just seen
             return None
         if status not in (0, 1):
@@ -190,7 +206,7 @@ def _database(path: Path) -> Any:
         return None if "an empty database" in str(error) else ((str(error),), None, ())
 
 
-def _run(words: str, folder: Path) -> tuple[int, str]:
+def run(words: str, folder: Path) -> tuple[int, str]:
     """Run a command in a process of its own, forked from this warm one; return its status and standard error."""
     reading, writing = os.pipe()
     child = os.fork()
