@@ -182,9 +182,9 @@ def _memory(path: Path | None, tags: CubeTags, n_objects: int | None) -> RobotMe
     if path is None:
         return RobotMemory(assumptions)
     if goes_to_database(path):
-        return open_memory(path) if path.exists() and path.stat().st_size else open_memory(path, assumptions)
+        return open_memory(path) if os.path.exists(path) and path.stat().st_size else open_memory(path, assumptions)
     plain_files.check_writable(path)
-    return load_memory(path) if path.exists() else RobotMemory(assumptions)
+    return load_memory(path) if os.path.exists(path) else RobotMemory(assumptions)
 
 
 def _page(port: int | None, asks: bool, words: queue.Queue[str], stack: ExitStack) -> LivePage | None:

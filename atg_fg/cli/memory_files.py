@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -148,7 +149,7 @@ def merge(
     """
     options.check_json_option(json_file)
     plain_files.check_writable(output)
-    if output.exists():
+    if os.path.exists(output):
         raise InvalidInputError(f"{output}: is already there; expected the path of a new file")
     union = unite(load_memory(first), load_memory(second))
     n_trials = 0

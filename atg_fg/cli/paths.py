@@ -119,7 +119,7 @@ def _collide(one: _Given, other: _Given) -> bool:
         printed = first.parameter.written and first.path.suffix.lower() in _PRINTED
         if printed and same_file(first.path.with_suffix(".json"), second.path):
             return True
-        made = first.parameter.written and first.path.is_dir() and IN_FOLDERS.fullmatch(second.path.name)
+        made = first.parameter.written and os.path.isdir(first.path) and IN_FOLDERS.fullmatch(second.path.name)
         if made and same_file(first.path, second.path.parent):
             return True
     return False

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
@@ -130,7 +131,7 @@ def recognise(
     engine_for(chosen, parameters)
     given = given_spec(spec, slots, actions, labels, objects, aspects, exclusive)
     recordings = [read_recording(file, given) for file in files]
-    if not learns and not memory.exists():
+    if not learns and not os.path.exists(memory):
         raise InvalidInputError(f"{memory}: no such file; expected a memory, or --learn to begin one")
     with closing(_memory_for(memory, recordings, parameters, keeps=learns)) as kept:
         presented = {trial.object for each in recordings for trial in each.trials}
@@ -199,7 +200,7 @@ def _memory_for(
     """
     if keeps:
         plain_files.check_writable(path)
-    is_there = path.exists() and not (plain_files.is_plain_file(path) and path.stat().st_size == 0)
+    is_there = os.path.exists(path) and not (plain_files.is_plain_file(path) and path.stat().st_size == 0)
     if keeps and goes_to_database(path):
         held = open_memory(path) if is_there else open_memory(path, _extended(recordings[0].assumptions(), recordings))
     elif is_there:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import sys
 from contextlib import ExitStack, closing
 from pathlib import Path
@@ -132,7 +133,7 @@ def _opened(memory: Path | None, save_memory: Path | None) -> RobotMemory | None
     """Return the memory to start from; it keeps what it learns if it is saved to the database that it comes from."""
     if memory is None:
         return None
-    if save_memory is not None and is_database(memory) and save_memory.exists() and memory.samefile(save_memory):
+    if save_memory is not None and is_database(memory) and os.path.exists(save_memory) and memory.samefile(save_memory):
         return open_memory(memory)
     return load_memory(memory)
 

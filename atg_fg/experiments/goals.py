@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import gzip
 import json
+import os
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import closing
 from dataclasses import asdict, dataclass, field
@@ -218,7 +219,7 @@ def _run_and_save(plan: GoalPlan, seed: int, records: Path | None, number: int) 
     if records is None:
         return run_goals(plan, run_seed(seed, number)).served
     file = GoalRunFile(_run_path(records, number), {"seed": seed, "run": number, **unusual(plan)})
-    if file.path.exists():
+    if os.path.exists(file.path):
         return file.read()
     run = run_goals(plan, run_seed(seed, number))
     file.write(run.served, run.records)

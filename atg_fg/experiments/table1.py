@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Sequence
 from contextlib import closing
 from dataclasses import dataclass, field, replace
@@ -206,11 +207,11 @@ def run_tests(
         InvalidInputError: As for ``run_test`` and ``run_pieces``.
     """
     if records is not None:
-        records = records.resolve() if goes_to_database(records) else make_folder(records).resolve()
+        records = Path(os.path.realpath(records if goes_to_database(records) else make_folder(records)))
         for plan, seed in plans if not resume else ():
             _check_not_begun(plan, seed, records)
     # A worker always resumes: a worker that died has left a part of the test to it.
-    resolved = None if memories is None else memories.resolve()
+    resolved = None if memories is None else Path(os.path.realpath(memories))
     run = partial(_run_one_of, records=records, memories=resolved)
 
     def keep(number: int, result: TestResult) -> None:

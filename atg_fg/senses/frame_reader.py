@@ -94,9 +94,11 @@ def _of_images(name: str) -> Iterator[tuple[float, Any]]:
 
     folder = Path(name)
     files = (
-        sorted(file for file in folder.iterdir() if file.suffix.lower() in IMAGE_SUFFIXES) if folder.is_dir() else []
+        sorted(file for file in folder.iterdir() if file.suffix.lower() in IMAGE_SUFFIXES)
+        if os.path.isdir(folder)
+        else []
     )
-    if folder.is_file():
+    if os.path.isfile(folder):
         files = [folder]
     if not files:
         raise ValueError("no images in this folder")

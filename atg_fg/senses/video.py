@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import os
 import queue
 import subprocess
 import sys
@@ -154,15 +155,15 @@ def _check_name(source: Source, name: str) -> None:
     elif source == "video":
         if "://" not in name:
             check_plain_file(name, "a video")
-    elif not Path(name).is_dir():
+    elif not os.path.isdir(name):
         check_plain_file(name, "an image, or a folder of images")
 
 
 def check_plain_file(path: str | Path, expected: str) -> None:
     """Raise ``InvalidInputError`` unless there is a plain file at ``path``: one that can be read again, and ends."""
     there = Path(path)
-    if not there.is_file():
-        what = "a folder" if there.is_dir() else "no plain file" if there.exists() else "no such file"
+    if not os.path.isfile(there):
+        what = "a folder" if os.path.isdir(there) else "no plain file" if os.path.exists(there) else "no such file"
         raise InvalidInputError(f"{path}: {what}; expected {expected}")
 
 

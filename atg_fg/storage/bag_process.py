@@ -28,6 +28,8 @@ from atg_fg.storage.rosbag_recordings import BagTopics
 #: Seconds of processor time for any bag, and bytes for each further second: a tenth of what is read in one.
 _SECONDS: Final = 20
 _BYTES_A_SECOND: Final = 100_000
+#: How many times that it may wait for the disk, or for what is no file.
+_WAITS: Final = 10
 #: Bytes of memory for any bag; besides there are so many times what it may unfold to.
 _LEAST_MEMORY: Final = 2**28
 _COPIES: Final = 4
@@ -52,7 +54,7 @@ def read_bag(path: Path, topics: BagTopics) -> Recording:
         said = done.stderr.decode(errors="replace").strip().rpartition("\n")[2]
         if done.returncode == 2:
             raise InvalidInputError(said)
-        if done.returncode in (-signal.SIGKILL, -signal.SIGXCPU):
+        if done.returncode in (-signal.SIGKILL, -signal.SIGXCPU, -signal.SIGALRM):
             said = "it takes longer than its size explains"
         if done.returncode:
             raise rosbag_recordings.unreadable(path, RuntimeError(said or f"status {done.returncode}"))
@@ -74,6 +76,7 @@ def _limit(size: int) -> None:
         (resource.RLIMIT_CPU, seconds),
     ):
         resource.setrlimit(kind, (most, most))
+    signal.alarm(_WAITS * seconds)
 
 
 def _main(path: str, output: str) -> int:

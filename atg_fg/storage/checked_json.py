@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import math
+from collections import Counter
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any, Final, NoReturn
@@ -59,9 +60,8 @@ def _refuse_constant(name: str) -> NoReturn:
 def _unique_keys(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
     result = dict(pairs)
     if len(result) < len(pairs):
-        keys = [key for key, _ in pairs]
-        repeated = next(key for key in keys if keys.count(key) > 1)
-        raise ValueError(f"key {repeated!r} is repeated")
+        repeated, _ = Counter(key for key, _ in pairs).most_common(1)[0]
+        raise ValueError(f"key {brief(repeated)} is repeated")
     return result
 
 
@@ -71,7 +71,7 @@ def read_object(value: Any, place: str, keys: tuple[str, ...], optional: tuple[s
         raise InvalidInputError(f"{place}: {brief(value)}; expected an object with {', '.join(keys)}")
     for key in value:
         if key not in keys + optional:
-            raise InvalidInputError(f"{place}: unknown key {key!r}; expected {', '.join(keys + optional)}")
+            raise InvalidInputError(f"{place}: unknown key {brief(key)}; expected {', '.join(keys + optional)}")
     for key in keys:
         if key not in value:
             raise InvalidInputError(f"{place}: key {key!r} is missing; expected {', '.join(keys)}")

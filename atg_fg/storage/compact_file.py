@@ -121,7 +121,7 @@ def _read_arrays(path: Path | str, place: str) -> dict[str, AnyIntArray]:
     except _UNSOUND as error:
         if isinstance(error, (InvalidInputError, TooLargeError)):
             raise
-        raise InvalidInputError(f"{place}: not a sound file of arrays: {error}; not a compact memory") from error
+        raise InvalidInputError(f"{place}: not a sound file of arrays: {error}; expected a compact memory") from error
 
 
 def _name_of(member: zipfile.ZipInfo) -> str:

@@ -36,7 +36,7 @@ class GrowingFile:
         self.path = path
         self._what, self._packed = what, packed
         self._header = json.loads(json.dumps(header, default=plain_json))
-        self._end = path.stat().st_size if path.exists() else 0
+        self._end = path.stat().st_size if os.path.exists(path) else 0
 
     def begin(self) -> None:
         """Make the file, with its header.
@@ -56,7 +56,7 @@ class GrowingFile:
         Raises:
             InvalidInputError: The file cannot be read, or has another header.
         """
-        if not self.path.exists():
+        if not os.path.exists(self.path):
             self.begin()
             return []
         lines, sound = _sound_lines(self.path, packed=self._packed)
@@ -108,7 +108,7 @@ def append_bytes(path: Path | str, content: bytes, start: int | None = None) -> 
 
 def check_not_begun(path: Path) -> None:
     """Raise ``InvalidInputError`` if there is a file of records already."""
-    if path.exists():
+    if os.path.exists(path):
         raise InvalidInputError(f"{path}: is already there; expected another folder, or --resume to go on")
 
 

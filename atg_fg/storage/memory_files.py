@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import Final
 
@@ -117,6 +118,6 @@ def open_memory(
 def goes_to_database(path: Path | str) -> bool:
     """Return whether a memory is saved to ``path`` as a database: by what is there, or else by the name."""
     there = Path(path)
-    if there.exists() and not (is_plain_file(path) and there.stat().st_size == 0):
+    if os.path.exists(there) and not (is_plain_file(path) and there.stat().st_size == 0):
         return is_database(path)
     return there.suffix in DATABASE_SUFFIXES

@@ -21,7 +21,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO, Final
 
-from atg_fg.core.errors import InvalidInputError, TooLargeError
+from atg_fg.core.errors import AtgError, InvalidInputError, TooLargeError
 from atg_fg.storage.limits import MAX_FILE_BYTES, MAX_UNPACKED_BYTES, byte_limit, gzip_members, refuse_size
 
 try:
@@ -157,13 +157,16 @@ def readable_again(path: Path) -> Iterator[Path]:
         InvalidInputError: The pipe cannot be read.
         TooLargeError: As for ``read_bytes_file``.
     """
-    if is_plain_file(path) or not path.exists() or path.is_dir():
+    if is_plain_file(path) or not os.path.exists(path) or os.path.isdir(path):
         yield path
         return
     with tempfile.TemporaryDirectory(prefix="atg-fg-") as folder:
         copy = Path(folder) / (path.name or "pipe")
         copy.write_bytes(read_bytes_file(path))
-        yield copy
+        try:
+            yield copy
+        except AtgError as error:
+            raise type(error)(str(error).replace(str(copy), str(path))) from error
 
 
 def write_bytes_atomically(path: Path | str, content: bytes) -> None:

@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import errno
 import json
+import os
 import tempfile
 from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
@@ -105,6 +106,8 @@ def read_bag(path: Path, topics: BagTopics) -> Recording:
         ) from error
     with ExitStack() as stack:
         try:
+            if not all(os.path.isfile(each) or os.path.isdir(each) for each in _parts_of(path)):
+                raise OSError(errno.EINVAL, "no plain file" if os.path.exists(path) else "no such file")
             folder = stack.enter_context(_folder_of(path)) if path.suffix == ".mcap" else path
             reader = stack.enter_context(AnyReader([folder], default_typestore=get_typestore(Stores.LATEST)))
         except Exception as error:  # whatever the library makes of what is no bag
@@ -149,8 +152,12 @@ def _folder_of(path: Path) -> Iterator[Path]:
 
 def size_of(path: Path) -> int:
     """Return how many bytes there are in a bag: a file, or the files of a folder."""
-    found = [path, *(path.iterdir() if path.is_dir() else ())]
-    return sum(each.stat().st_size for each in found if each.is_file())
+    return sum(each.stat().st_size for each in _parts_of(path) if os.path.isfile(each))
+
+
+def _parts_of(path: Path) -> list[Path]:
+    """Return a bag and, if it is a folder, what lies in it."""
+    return [path, *(path.iterdir() if os.path.isdir(path) else ())]
 
 
 def unreadable(path: Path, error: Exception) -> AtgError:
@@ -315,4 +322,4 @@ def _confidence(value: Any, place: str) -> float:
 
 def is_bag(path: Path) -> bool:
     """Return whether a path is that of a bag, by its name: a folder with ``metadata.yaml``, ``.mcap`` or ``.bag``."""
-    return path.suffix in (".mcap", ".bag", ".db3") or (path.is_dir() and (path / "metadata.yaml").exists())
+    return path.suffix in (".mcap", ".bag", ".db3") or (os.path.isdir(path) and os.path.exists(path / "metadata.yaml"))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -81,7 +82,7 @@ def _folder() -> Path:
         folder = None
     else:
         folder = Path(getDataPath()) / "random_urdfs"
-    if folder is None or not folder.is_dir():
+    if folder is None or not os.path.isdir(folder):
         raise MissingDependencyError(
             "world 'meshes': the random meshes of PyBullet are not installed; expected its sample models, as they come "
             "with it: pip install --force-reinstall --no-deps pybullet"

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import sys
 import sysconfig
 import tomllib
@@ -91,8 +92,8 @@ def read_mapping(path: Path) -> tuple[Path, RobotMapping]:
         InvalidInputError: The file cannot be read, or is no mapping.
     """
     try:
-        if not path.is_file() or path.stat().st_size > _MOST_BYTES:
-            raise OSError("not a plain file" if path.exists() else "no such file")
+        if not os.path.isfile(path) or path.stat().st_size > _MOST_BYTES:
+            raise OSError("not a plain file" if os.path.exists(path) else "no such file")
         told = tomllib.loads(path.read_text(encoding="utf-8"))
     except (OSError, ValueError, RecursionError) as error:
         raise InvalidInputError(f"{path}: cannot be read as a mapping: {error}; expected TOML") from error

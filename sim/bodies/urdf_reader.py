@@ -147,8 +147,8 @@ def read_urdf(path: Path) -> UrdfTree:
         InvalidInputError: The file cannot be read, is no URDF, is no tree, or holds what no robot can have.
     """
     try:
-        if not path.is_file():
-            raise OSError("no such file" if not path.exists() else "not a plain file")
+        if not os.path.isfile(path):
+            raise OSError("no such file" if not os.path.exists(path) else "not a plain file")
         if path.stat().st_size > _MOST_BYTES:
             raise OSError(f"larger than {_MOST_BYTES // 1_000_000} MB")
         robot = ElementTree.parse(path).getroot()
@@ -273,7 +273,7 @@ def found_mesh(filename: str, urdf: Path) -> Path:
     else:
         places = [Path(rest)] if rest.startswith("/") else [folder / rest for folder in folders]
     for place in places:
-        if place.is_file():
+        if os.path.isfile(place):
             if len(str(place)) > _LONGEST_PATH:
                 raise ValueError(f"the path of mesh {filename[-60:]!r} is longer than {_LONGEST_PATH} characters")
             return place

@@ -5,6 +5,7 @@ Rerun is imported by what is called here, not with the module; who has a recordi
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -126,4 +127,4 @@ def _link_pose(client: int, body: int, link: int) -> tuple[Any, Any]:
 def _mesh_file(name: str, meshes: Path | None) -> Path | None:
     """Return where a mesh is, ``None`` if it is gone."""
     candidates = [Path(name), *([meshes / Path(name).name] if meshes is not None else [])]
-    return next((path for path in candidates if path.is_file()), None)
+    return next((path for path in candidates if os.path.isfile(path)), None)

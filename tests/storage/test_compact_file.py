@@ -87,7 +87,7 @@ def test_what_is_no_such_file_is_refused(file, tmp_path):
     with pytest.raises(InvalidInputError, match=r"memory\.npz: "):
         load_compact_memory(file)
     np.save(tmp_path / "alone.npy", np.zeros(3))
-    with pytest.raises(InvalidInputError, match="not a compact memory"):
+    with pytest.raises(InvalidInputError, match="expected a compact memory"):
         load_compact_memory(tmp_path / "alone.npy")
 
 

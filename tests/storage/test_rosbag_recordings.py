@@ -288,9 +288,12 @@ class TestBombs:
         assert "holds more than 67,108,864 bytes" in message
         assert seconds < 10
 
-    @pytest.mark.parametrize(("signal", "said"), [("KILL", "takes longer than its size"), ("SEGV", "status -11")])
+    @pytest.mark.parametrize(
+        ("signal", "said"),
+        [("KILL", "takes longer than its size"), ("ALRM", "takes longer than its size"), ("SEGV", "status -11")],
+    )
     def test_a_reader_that_is_ended_is_one_line(self, signal, said, plain, topics, tmp_path, monkeypatch):
-        """By the limit of its processor time, or by a fault of the library."""
+        """By the limit of its processor time, or of all of its time, or by a fault of the library."""
         stub = tmp_path / "python"
         stub.write_text(f"#!/bin/sh\nkill -{signal} $$\n")
         stub.chmod(0o755)

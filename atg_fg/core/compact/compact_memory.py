@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any, NamedTuple, NoReturn
 
@@ -66,7 +67,7 @@ class CompactMemory(RobotMemory):
                 raise InvalidInputError(f"memory: {graph.name!r} was made under other assumptions than this memory")
         names = [graph.name for graph in graphs]
         if len(set(names)) < len(names):
-            repeated = next(name for name in names if names.count(name) > 1)
+            repeated, _ = Counter(names).most_common(1)[0]
             raise InvalidInputError(f"memory: name {repeated!r} is repeated; expected unique names")
         self._fill(names, _arrays_of(graphs, assumptions))
 

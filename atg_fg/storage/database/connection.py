@@ -124,7 +124,7 @@ def open_to_write(path: Path | str, *, create: bool = False, wait: float = WAIT)
         BusyMemoryError: Another process was writing all that time.
         InvalidInputError: There is no file, it is no memory database, or it cannot be written.
     """
-    if not create or Path(path).exists():
+    if not create or os.path.exists(path):
         _check_file(path)
     with translated(path):
         connection = _connected(path, "mode=rwc" if create else "mode=rw", wait)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -80,7 +81,7 @@ def check_not_in_database(path: Path, header: Mapping[str, Any]) -> None:
         path: The database.
         header: As for ``DatabaseTrialLog``.
     """
-    if not path.exists() or not path.stat().st_size:
+    if not os.path.exists(path) or not path.stat().st_size:
         return
     with reading(path) as connection:
         there = trial_rows.find_experiment(connection, _experiment_of(header)) is not None
