@@ -15,7 +15,6 @@ from numpy.typing import NDArray
 
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import FloatArray
-from atg_fg.senses.opencv import cv2
 
 Image: TypeAlias = NDArray[np.uint8]
 #: Turns a crop, RGB of shape [height, width, 3], into features of shape [F].
@@ -69,6 +68,8 @@ def view_features(view: Image) -> FloatArray:
 
 def _grids(crop: Image) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
     """Return colours and directions of gradients in each cell, shapes [cells, cells, 3] and [cells, cells, 8]."""
+    from atg_fg.senses.opencv import cv2  # whoever only reads a sense from a file needs none
+
     lab = cv2.cvtColor(crop, cv2.COLOR_RGB2LAB).astype(np.float32)
     cells = (_GRID, _GRID)
     colours = cv2.resize(lab, cells, interpolation=cv2.INTER_AREA) * _COLOUR_SCALE
@@ -103,6 +104,8 @@ def rectified(frame: Image, corners: FloatArray, size: int = CROP) -> Image:
         corners: Of the square in the frame, clockwise from its upper left one, shape [4, 2], pixels.
         size: Side of what is returned, pixels.
     """
+    from atg_fg.senses.opencv import cv2
+
     square = np.array([[0, 0], [size, 0], [size, size], [0, size]], dtype=np.float32)
     homography = cv2.getPerspectiveTransform(corners.astype(np.float32), square)
     return np.asarray(cv2.warpPerspective(frame, homography, (size, size), flags=cv2.INTER_AREA), dtype=np.uint8)

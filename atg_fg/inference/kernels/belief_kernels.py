@@ -29,9 +29,6 @@ _LEAST_DIFFERENCE: Final = 0.05
 #: Of few bytes; which type it is depends on the sizes.
 SmallIntArray = NDArray[Any]
 
-#: Target and source, count and probability of edges, as in ``Tables``.
-Edges = tuple[SmallIntArray, FloatArray, FloatArray]
-
 
 class Tables(NamedTuple):
     """What H hypotheses know, in rows with room for more.
@@ -81,11 +78,10 @@ def write_row(
     for number in range(len(patterns)):
         pattern[hypothesis, number + 1] = patterns[number]
     begins[hypothesis] = first
-    own = begins[hypothesis]
     for row in range(len(counts)):
         source, target = counts[row, 0] + 1, counts[row, 2] + 1
-        _count((edges, counted, probability), own, source, counts[row, 1], target, float(counts[row, 3]))
-    _weigh_own((edges, counted, probability), own, concentration)
+        _count(edges, counted, probability, begins, hypothesis, source, counts[row, 1], target, float(counts[row, 3]))
+    _weigh_own(edges, counted, probability, begins, hypothesis, concentration)
 
 
 @compiled
@@ -121,49 +117,73 @@ def weigh_all(tables: tuple[Any, ...], concentration: float) -> None:
     """Set what the counts of all rows of all hypotheses come to."""
     _, _, begins, edges, counted, probability = tables
     for hypothesis in range(len(begins)):
-        _weigh_own((edges, counted, probability), begins[hypothesis], concentration)
+        _weigh_own(edges, counted, probability, begins, hypothesis, concentration)
 
 
 @compiled
-def _weigh_own(edges: Edges, begins: IntArray, concentration: float) -> None:
-    for action in range(len(begins) - 1):
-        for edge in range(begins[action], begins[action + 1]):
-            _weigh(edges, begins, edges[0][edge, 1], action, concentration)
+def _weigh_own(
+    edges: SmallIntArray,
+    counted: FloatArray,
+    probability: FloatArray,
+    begins: IntArray,
+    hypothesis: int,
+    concentration: float,
+) -> None:
+    for action in range(begins.shape[1] - 1):
+        for edge in range(begins[hypothesis, action], begins[hypothesis, action + 1]):
+            _weigh(edges, counted, probability, begins, hypothesis, edges[edge, 1], action, concentration)
 
 
 @compiled
-def _weigh(edges: Edges, begins: IntArray, source: int, action: int, concentration: float) -> None:
-    """Set what the counts of a transition row come to, where edges of the hypothesis begin at ``begins``, [A + 1]."""
-    ends, counted, probability = edges
+def _weigh(
+    edges: SmallIntArray,
+    counted: FloatArray,
+    probability: FloatArray,
+    begins: IntArray,
+    hypothesis: int,
+    source: int,
+    action: int,
+    concentration: float,
+) -> None:
+    """Set what the counts of a transition row come to."""
     total = concentration
-    for edge in range(begins[action], begins[action + 1]):
-        if ends[edge, 1] == source:
+    for edge in range(begins[hypothesis, action], begins[hypothesis, action + 1]):
+        if edges[edge, 1] == source:
             total += counted[edge]
-    for edge in range(begins[action], begins[action + 1]):
-        if ends[edge, 1] == source:
+    for edge in range(begins[hypothesis, action], begins[hypothesis, action + 1]):
+        if edges[edge, 1] == source:
             probability[edge] = counted[edge] / total
 
 
 @compiled
-def _count(edges: Edges, begins: IntArray, source: int, action: int, target: int, number: float) -> None:
+def _count(
+    edges: SmallIntArray,
+    counted: FloatArray,
+    probability: FloatArray,
+    begins: IntArray,
+    hypothesis: int,
+    source: int,
+    action: int,
+    target: int,
+    number: float,
+) -> None:
     """Count a transition so many times more; there is room for one more edge."""
-    ends, counted, probability = edges
-    first, place = begins[action], begins[action + 1]
+    first, place = begins[hypothesis, action], begins[hypothesis, action + 1]
     while place > first and (
-        ends[place - 1, 0] > target or (ends[place - 1, 0] == target and ends[place - 1, 1] > source)
+        edges[place - 1, 0] > target or (edges[place - 1, 0] == target and edges[place - 1, 1] > source)
     ):
         place -= 1
-    if place > first and ends[place - 1, 0] == target and ends[place - 1, 1] == source:
+    if place > first and edges[place - 1, 0] == target and edges[place - 1, 1] == source:
         counted[place - 1] += number
         return
-    n_actions = len(begins) - 1
-    for edge in range(begins[n_actions], place, -1):
-        ends[edge, 0], ends[edge, 1] = ends[edge - 1, 0], ends[edge - 1, 1]
+    n_actions = begins.shape[1] - 1
+    for edge in range(begins[hypothesis, n_actions], place, -1):
+        edges[edge, 0], edges[edge, 1] = edges[edge - 1, 0], edges[edge - 1, 1]
         counted[edge], probability[edge] = counted[edge - 1], probability[edge - 1]
-    ends[place, 0], ends[place, 1] = target, source
+    edges[place, 0], edges[place, 1] = target, source
     counted[place] = number
     for later in range(action + 1, n_actions + 1):
-        begins[later] += 1
+        begins[hypothesis, later] += 1
 
 
 @compiled
@@ -303,11 +323,8 @@ def _learn(
     for hypothesis in range(len(n_known)):
         n_own, source = n_known[hypothesis], 0
         if before >= 0:
-            if before == shown_before:
-                source = shown[hypothesis]
-            else:
-                source = _state_showing(pattern[hypothesis, : n_own + 1], before)
-        target = states[hypothesis] if is_known else _state_showing(pattern[hypothesis, : n_own + 1], seen)
+            source = shown[hypothesis] if before == shown_before else _state_showing(pattern, hypothesis, n_own, before)
+        target = states[hypothesis] if is_known else _state_showing(pattern, hypothesis, n_own, seen)
         if target == 0 and n_own < n_aspects:
             target = n_own + 1
             truth = (1.0 - delta) / (n_patterns - n_own)
@@ -319,18 +336,17 @@ def _learn(
             if before == seen:
                 source = target
         if source > 0 and target > 0:
-            own = begins[hypothesis]
-            _count((edges, counted, probability), own, source, action, target, 1.0)
-            _weigh((edges, counted, probability), own, source, action, concentration)
+            _count(edges, counted, probability, begins, hypothesis, source, action, target, 1.0)
+            _weigh(edges, counted, probability, begins, hypothesis, source, action, concentration)
         shown[hypothesis] = target
 
 
 @compiled
-def _state_showing(patterns: SmallIntArray, wanted: int) -> int:
-    """Return which state of one hypothesis shows a pattern, 0 if none does."""
+def _state_showing(patterns: SmallIntArray, hypothesis: int, n_own: int, wanted: int) -> int:
+    """Return which state of a hypothesis shows a pattern, 0 if none does."""
     found = 0
-    for state in range(1, len(patterns)):
-        if patterns[state] == wanted:
+    for state in range(1, n_own + 1):
+        if patterns[hypothesis, state] == wanted:
             found = state
     return found
 
@@ -352,7 +368,7 @@ def _explain_one(
     observed, noise = (1.0 - delta) * weight, delta / n_patterns * weight
     for hypothesis in range(len(n_known)):
         n_own = n_known[hypothesis]
-        state, rate, total = _state_showing(pattern[hypothesis, : n_own + 1], wanted), 0.0, noise
+        state, rate, total = _state_showing(pattern, hypothesis, n_own, wanted), 0.0, noise
         if state > 0:
             total += aspects[hypothesis, state] * observed
         elif n_own < n_aspects:
