@@ -90,7 +90,7 @@ class Inference(ABC):
         return RecognitionModel(self.memory, self.parameters, self.prior)
 
     def _protect(self) -> None:
-        protect([each for name, each in vars(self).items() if isinstance(each, (np.ndarray, tuple)) and name[0] != "_"])
+        protect([each for name, each in vars(self).items() if name[0] != "_" and isinstance(each, (np.ndarray, tuple))])
 
     def __copy__(self) -> Self:
         return deepcopy(self)

@@ -110,6 +110,23 @@ def hung(tree, name, parent, kind, upper):
     return link
 
 
+def with_legs(tree, joints_a_leg=7):
+    """Stand the robot on two legs that end in grippers, on a base that floats, as those for space do."""
+    world = ElementTree.SubElement(tree, "link", name="world")
+    floats = ElementTree.SubElement(tree, "joint", name="floating base", type="floating")
+    ElementTree.SubElement(floats, "parent", link=world.get("name"))
+    ElementTree.SubElement(floats, "child", link="base")
+    for side in ("left", "right"):
+        above = "base"
+        for number in range(joints_a_leg):
+            leg = hung(tree, f"r2/{side}_leg/joint{number}", above, "revolute", 1.5)
+            ElementTree.SubElement(ElementTree.SubElement(leg, "inertial"), "mass", value="0.01")
+            above = leg.get("name")
+        for jaw in range(2):
+            hung(tree, f"r2/{side}_leg/gripper/jaw{jaw}", above, "prismatic", 0.02)
+    return tree
+
+
 def with_fists_of_boxes(tree):
     """Give both hands a palm and four fingers bent into it, and no pad."""
     for side, outwards in (("left", 1.0), ("right", -1.0)):

@@ -155,6 +155,38 @@ def test_a_robot_with_more_joints_than_pybullet_takes_is_loaded(client, tmp_path
     assert pybullet.getNumJoints(robot.body, physicsClientId=client) == len(shell_mapping().moved)
 
 
+@pytest.mark.parametrize("joints_a_leg", [7, 80])
+def test_legs_are_a_part_of_the_base_however_many_joints_they_have(client, kinematics, tmp_path, joints_a_leg):
+    path = written(descriptions.with_legs(descriptions.parsed(), joints_a_leg), tmp_path)
+    robot = like_the_shell(path)
+    same_kinematics(robot.kinematics, kinematics)
+    assert not robot.notes  # token masses of what is fixed weigh nothing
+    body = RobotBody(client, robot)
+    assert set(body.joints) == set(shell_mapping().moved)
+    balls = [shape for shape in pybullet.getCollisionShapeData(body.body, -1, client) if shape[3] == (0.005,) * 3]
+    assert len(balls) == 2 * (joints_a_leg + 2)
+    shell = RobotBody(client)
+    np.testing.assert_allclose(body.gravity_torques(HOME_POSTURE), shell.gravity_torques(HOME_POSTURE), atol=1e-6)
+
+
+def test_joints_of_a_legged_robot_have_the_files_own_limits_and_tokens_raised(kinematics, tmp_path):
+    """Descriptions differ from each other in all of this at once."""
+    tree = descriptions.with_legs(descriptions.like_nasas())
+    model = model_of(tree, tmp_path)
+    own = like_the_shell(tmp_path / "own.urdf").kinematics
+    sign = np.ones((2, 7))
+    sign[1, [0, 2, 4, 6]] = -1
+    np.testing.assert_allclose(own.hands(sign * HOME_POSTURE).pad, kinematics.hands(HOME_POSTURE).pad, atol=1e-9)
+    for side, arm in enumerate(model.mapping.arms):
+        stated = [joint(tree, name).find("limit") for name in arm]
+        assert own.lower[side].tolist() == [float(limit.get("lower")) for limit in stated]
+        assert own.upper[side].tolist() == [float(limit.get("upper")) for limit in stated]
+        assert all(model.joints[name].link.mass >= 0.3 for name in arm)
+    (note,) = model.notes
+    assert "wrist/pitch" in note
+    assert "_leg/" not in note
+
+
 def test_pybullet_has_the_links_where_the_file_has_them(client, tmp_path):
     model = model_of(descriptions.mounted(descriptions.parsed()), tmp_path)
     path = tmp_path / "model.urdf"
