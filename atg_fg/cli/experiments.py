@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -167,7 +167,10 @@ def _table1(title: str, results: Iterable[TestResult], summary: dict[str, Any], 
     scores = ("identification", "recognition", "success")
     table.add_row("average", *(_percent(summary["average"][score]) for score in scores), style="bold")
     intervals = (summary["interval95"][score] for score in scores)
-    table.add_row("95% interval", *(f"{100 * low:.1f}-{100 * high:.1f}%" for low, high in intervals))
+    table.add_row("95% interval", *map(_share_interval, intervals))
+    between = [summary["between95"][score] for score in scores]
+    if any(between):
+        table.add_row("between tests", *("-" if each is None else _share_interval(each) for each in between))
     if "actions_a_trial" in summary:
         table.add_row("actions a trial", _mean_with_interval(summary["actions_a_trial"]))
     for ending in ("lost", "undecided"):
@@ -182,6 +185,12 @@ def _table1(title: str, results: Iterable[TestResult], summary: dict[str, Any], 
     if beside_paper:
         table.add_row("paper", *(_percent(PAPER_TABLE1[score]) for score in scores))
     return table
+
+
+def _share_interval(interval: Sequence[float]) -> str:
+    """Return an interval of a rate; one that a mean has by its spread may lead out of 0 to 1, where no rate is."""
+    low, high = (min(max(bound, 0.0), 1.0) for bound in interval)
+    return f"{100 * low:.1f}-{100 * high:.1f}%"
 
 
 def _mean_with_interval(number: dict[str, Any]) -> str:

@@ -10,6 +10,8 @@ from atg_fg.core.errors import InvalidInputError
 
 #: Two-sided 95 % point of the normal distribution.
 Z_95: Final = 1.959963984540054
+#: Degrees of freedom beyond which Student's distribution is the normal one, but for less than 0.001.
+_NORMAL: Final = 2400
 
 
 def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
@@ -38,9 +40,34 @@ def mean(values: Sequence[float]) -> float | None:
 
 
 def mean_interval(values: Sequence[float]) -> tuple[float, float] | None:
-    """Return the normal 95 % interval of the mean, or ``None`` for fewer than two values."""
+    """Return Student's 95 % interval of the mean, or ``None`` for fewer than two values."""
     centre, error = mean(values), standard_error(values)
-    return None if centre is None or error is None else (centre - Z_95 * error, centre + Z_95 * error)
+    if centre is None or error is None:
+        return None
+    margin = student_95(len(values) - 1) * error
+    return centre - margin, centre + margin
+
+
+def student_95(freedom: int) -> float:
+    """Return the two-sided 95 % point of Student's t distribution, by halving: its share within ±t is a finite sum."""
+    if freedom > _NORMAL:
+        return Z_95
+    low, high = Z_95, 13.0
+    while high - low > 1e-12 * high:
+        middle = (low + high) / 2
+        low, high = (middle, high) if _within(middle, freedom) < 0.95 else (low, middle)
+    return high
+
+
+def _within(t: float, freedom: int) -> float:
+    """Return the share of Student's t distribution within ±t (Abramowitz & Stegun 26.7.3 and 26.7.4)."""
+    angle, is_odd = math.atan(t / math.sqrt(freedom)), freedom % 2
+    term = math.cos(angle) if is_odd else 1.0
+    total = 0.0
+    for number in range(is_odd, freedom - 1, 2):
+        total += term
+        term *= (number + 1) / (number + 2) * math.cos(angle) ** 2
+    return 2 / math.pi * (angle + math.sin(angle) * total) if is_odd else math.sin(angle) * total
 
 
 def standard_error(values: Sequence[float]) -> float | None:

@@ -170,7 +170,8 @@ class Score:
 def summarise(results: Iterable[TestResult]) -> dict[str, Any]:
     """Return the tests, their average as the paper takes it (a mean over tests), and intervals.
 
-    Wilson intervals count all trials of all tests as one sample; the standard error is over tests.
+    Wilson intervals count all trials of all tests as one sample; the standard error, and Student's interval, are over
+    tests.
     """
     tests = list(results)
     rates = {
@@ -194,6 +195,10 @@ def summarise(results: Iterable[TestResult]) -> dict[str, Any]:
         "average": {name: mean(values) for name, values in rates.items()},
         "standard_error": {name: standard_error(values) for name, values in rates.items()},
         "interval95": {name: list(pooled_interval(tests, name)) for name in rates},
+        "between95": {
+            name: None if (interval := mean_interval(values)) is None else list(interval)
+            for name, values in rates.items()
+        },
         "lost": sum(test.lost for test in tests),
         "undecided": sum(test.undecided for test in tests),
         **_merges_of(tests),

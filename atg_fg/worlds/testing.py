@@ -16,6 +16,7 @@ from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import AtgError
 from atg_fg.core.promises import require, shared_generators
 from atg_fg.core.sense import Sense
+from atg_fg.senses.object_readings import look_of, readings_in, without_readings
 from atg_fg.worlds.base import World, detection_of, symbols_of
 from atg_fg.worlds.registry import assumptions_of, make_world, sense_of
 
@@ -35,10 +36,11 @@ def check_world(world: str | World, *, trials: int = 4, steps: int = 20, seed: i
     """Raise ``AssertionError`` if a world is none that trials can be run in; return how many looks were looked at.
 
     It must be what gymnasium's ``check_env`` takes; have numbered actions and looks with a whole number a slot, or
-    readings for its ``sense``; and say ``assumptions`` that fit these, if any. Every look must be a detection under
-    them, and say in ``info`` which object is presented, always the same in a trial, with no more different patterns
-    than aspects, where it says the pattern. The same seed must give the same trial, whatever was done before; no
-    generator that others share is used; and a look that was given does not change later.
+    readings for its ``sense``, and readings of each sense of the object; and say ``assumptions`` that fit these, if
+    any. Every look must be a detection under them, and say in ``info`` which object is presented, always the same in a
+    trial, with no more different patterns than aspects, where it says the pattern. The same seed must give the same
+    trial, whatever was done before; no generator that others share is used; and a look that was given does not change
+    later.
 
     Args:
         world: An instance, a name in ``WORLDS``, or ``module:namespace/Id-v0``.
@@ -79,8 +81,9 @@ def _taken_for_granted(world: World) -> tuple[Assumptions, Sense | None]:
     """Return what a world assumes and its sense, once its spaces fit them."""
     try:
         assumptions, sense = assumptions_of(world, _N_OBJECTS), sense_of(world)
+        space = without_readings(world.observation_space, assumptions.object_senses)
         if sense is not None:
-            sense.check_space(world.observation_space)
+            sense.check_space(space)
     except AtgError as error:
         raise AssertionError(str(error)) from error
     alphabet, actions = assumptions.alphabet, world.action_space
@@ -91,8 +94,8 @@ def _taken_for_granted(world: World) -> tuple[Assumptions, Sense | None]:
     )
     slots, greatest = alphabet.slots, alphabet.n_symbols - 1
     require(
-        sense is not None or symbols_of(world.observation_space) == [alphabet.n_symbols] * len(slots),
-        f"observation space {world.observation_space}; expected whole numbers from -1 to {greatest} in each of "
+        sense is not None or symbols_of(space) == [alphabet.n_symbols] * len(slots),
+        f"observation space {space}; expected whole numbers from -1 to {greatest} in each of "
         f"{len(slots)} slots: {', '.join(slots)}",
     )
     return assumptions, sense
@@ -144,11 +147,12 @@ class _Trial:
         space = self._world.observation_space
         require(space.contains(observation), f"{place}: {observation!r}; expected it to be in the space of looks")
         require(isinstance(info, Mapping), f"{place}: info {info!r}; expected a mapping")
-        if self._sense is None:
-            try:
-                self._assumptions.alphabet.check_detection(detection_of(observation))
-            except AtgError as error:
-                raise AssertionError(f"{place}: {error}") from error
+        try:
+            readings_in(self._assumptions.object_senses, observation)
+            if self._sense is None:
+                self._assumptions.alphabet.check_detection(detection_of(look_of(observation)))
+        except AtgError as error:
+            raise AssertionError(f"{place}: {error}") from error
 
     def _check_object(self, presented: object, info: Mapping[str, Any], place: str) -> None:
         shown, pattern = info.get("object"), info.get("pattern")

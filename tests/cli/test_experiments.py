@@ -23,6 +23,8 @@ def test_table1_prints_json_in_the_promised_shape(run):
         assert 0 <= test["success"] <= 1
     low, high = document["interval95"]["success"]
     assert low <= document["average"]["success"] <= high
+    low, high = document["between95"]["success"]
+    assert (low + high) / 2 == pytest.approx(document["average"]["success"])
 
 
 def test_table1_shows_the_papers_row_beside_ours(run):
@@ -32,6 +34,8 @@ def test_table1_shows_the_papers_row_beside_ours(run):
     assert "paper" in output
     assert "79.2%" in output
     assert "95% interval" in output
+    assert "between tests" not in output
+    assert "between tests" in run("table1", *QUICK, "--tests", "2", "--actions", "3")[1]
 
 
 def test_table1_of_other_objects_is_not_held_against_the_paper(run):

@@ -5,7 +5,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.core.statistics import Z_95, mean, mean_interval, standard_error, wilson_interval
+from atg_fg.core.statistics import mean, mean_interval, standard_error, student_95, wilson_interval
 
 
 def test_the_interval_of_the_papers_success_rate_is_the_published_one():
@@ -39,6 +39,14 @@ def test_mean_and_its_standard_error_by_hand():
 
 def test_the_interval_of_a_mean_is_as_wide_as_its_standard_error_says():
     low, high = mean_interval([1.0, 2.0, 3.0])
-    assert (low, high) == pytest.approx((2 - Z_95 / math.sqrt(3), 2 + Z_95 / math.sqrt(3)))
+    margin = student_95(2) / math.sqrt(3)
+    assert (low, high) == pytest.approx((2 - margin, 2 + margin))
     assert mean_interval([1.0]) is None
     assert mean_interval([]) is None
+
+
+def test_students_point_is_that_of_its_distribution():
+    from scipy import stats
+
+    for freedom in (1, 2, 3, 4, 9, 10, 999, 2400, 2401, 10**9):
+        assert student_95(freedom) == pytest.approx(stats.t.ppf(0.975, freedom), abs=1e-9 if freedom <= 2400 else 1e-3)

@@ -11,10 +11,12 @@ from atg_fg.core.memory import RobotMemory
 from atg_fg.engines import begin_trial
 from atg_fg.experiments.trial import learn_from, run_trial
 from atg_fg.policies import RandomPolicy
+from atg_fg.policies.testing import check_policy
 from atg_fg.senses.face_features import VIEW, view_features
 from atg_fg.storage.presets import preset
 from atg_fg.worlds.arcube import ORIENTATIONS, rotation_of
 from atg_fg.worlds.registry import assumptions_of, make_world_with, sense_of
+from atg_fg.worlds.testing import check_world
 from sim.bodies.meshes import N_FOR_CALIBRATION, N_MESHES, calibration_meshes, make_meshes
 
 
@@ -22,6 +24,20 @@ from sim.bodies.meshes import N_FOR_CALIBRATION, N_MESHES, calibration_meshes, m
 def world():
     with closing(make_world_with("meshes", 4, 3, weight=True)) as made:
         yield made
+
+
+@pytest.mark.parametrize("weight", [False, True])
+def test_trials_can_be_run_in_it(weight):
+    with closing(make_world_with("meshes", 4, 3, weight=weight)) as made:
+        assert check_world(made, trials=1, steps=4) == 5
+
+
+@pytest.mark.parametrize("policy", ["entropy", "random", "explore"])
+def test_policies_choose_among_things_that_were_felt(world, policy):
+    memory = RobotMemory(assumptions_of(world, 4), sense=sense_of(world))
+    for kilograms in (0.3, 0.6):
+        memory.learn([0, 1], [0], None, measured=[(), (("weight", kilograms),)])
+    assert check_policy(policy, memory, cases=2) == 10
 
 
 def test_things_are_different_ones_and_none_of_those_that_calibrate():

@@ -51,6 +51,8 @@ def trials(world, memory, n, seed=0):
 
 def test_trials_can_be_run_in_it(world):
     assert check_world(world, trials=1, steps=4) == 5
+    with make_world_with("picture-box", 4, 3, weight=True) as felt:
+        assert check_world(felt, trials=1, steps=4) == 5
 
 
 def test_boxes_share_pictures_and_no_two_are_the_same_however_they_are_turned():

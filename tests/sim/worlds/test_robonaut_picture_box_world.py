@@ -2,13 +2,13 @@
 
 import numpy as np
 import pytest
-from gymnasium.utils.env_checker import check_env
 
 from atg_fg.core.errors import InvalidInputError, UnknownNameError
 from atg_fg.experiments.table1 import TestPlan, run_test
 from atg_fg.storage.recorded_header import read_header
 from atg_fg.worlds.arcube import SUCCESSORS
 from atg_fg.worlds.registry import make_world, make_world_with
+from atg_fg.worlds.testing import check_world
 from sim.bodies.cube import CUBE_SIZE
 from sim.vision.image_noise import Imaging
 from sim.worlds.domain_randomization import Condition
@@ -65,9 +65,10 @@ def test_an_action_brings_the_box_to_the_next_orientation_and_depth_finds_it(wor
     assert world.scene.self_contacts == 0
 
 
-@pytest.mark.filterwarnings("ignore:.*Box observation space m:UserWarning")
-def test_the_world_keeps_gymnasiums_contract(make):
-    check_env(make(), skip_render_check=True)
+@pytest.mark.slow
+@pytest.mark.parametrize("weight", [False, True])
+def test_trials_can_be_run_in_it(make, weight):
+    assert check_world(make(weight=weight), trials=1, steps=2) == 3
 
 
 def test_its_spaces_are_those_of_the_rendered_world(world):
