@@ -39,6 +39,7 @@ def test_a_quick_run_measures_everything_and_writes_it(run, folder, page):
             "targets",
             "against",
             "peak_memory",
+            "worker_start",
         )
     }
     assert platform.node() not in json.dumps(document).split('"')
