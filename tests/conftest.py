@@ -3,9 +3,17 @@ import pytest
 
 from tests import dask_cluster
 
-# The same examples on every run: a test that passed yesterday fails today only if the code has changed.
-hypothesis.settings.register_profile("atg-fg", derandomize=True, deadline=None, database=None, max_examples=60)
-hypothesis.settings.load_profile("atg-fg")
+
+def pytest_configure(config):
+    """Try some examples, and where slow tests run, many.
+
+    They are the same on every run: a test that passed yesterday fails today only if the code has changed.
+    """
+    n_examples = 12 if "not slow" in config.option.markexpr else 60
+    hypothesis.settings.register_profile(
+        "atg-fg", derandomize=True, deadline=None, database=None, max_examples=n_examples
+    )
+    hypothesis.settings.load_profile("atg-fg")
 
 
 @pytest.fixture(scope="session")

@@ -9,8 +9,6 @@ import pytest
 
 FOLDER = Path(__file__).parents[1] / "notebooks"
 NOTEBOOKS = sorted(FOLDER.glob("*.ipynb"))
-#: Those that run for half a minute.
-LONG = ("03", "06", "07", "08", "09", "10", "11", "12")
 
 
 @pytest.fixture(scope="module")
@@ -25,20 +23,7 @@ def sources(notebook):
 
 
 def test_there_are_these_notebooks_in_reading_order():
-    assert [path.stem[:2] for path in NOTEBOOKS] == [
-        "01",
-        "02",
-        "03",
-        "04",
-        "05",
-        "06",
-        "07",
-        "08",
-        "09",
-        "10",
-        "11",
-        "12",
-    ]
+    assert [path.stem[:2] for path in NOTEBOOKS] == [f"{number:02}" for number in range(1, 13)]
 
 
 # A kernel's sockets are closed by its own threads, some time after the test; that is none of this project's.
@@ -46,7 +31,7 @@ def test_there_are_these_notebooks_in_reading_order():
 @pytest.mark.filterwarnings("ignore::DeprecationWarning:zmq", "ignore::RuntimeWarning:zmq")
 @pytest.mark.parametrize(
     "path",
-    [pytest.param(each, marks=pytest.mark.slow if each.stem.startswith(LONG) else ()) for each in NOTEBOOKS],
+    [NOTEBOOKS[0], *(pytest.param(each, marks=pytest.mark.slow) for each in NOTEBOOKS[1:])],
     ids=lambda path: path.stem,
 )
 def test_a_notebook_runs_from_its_first_cell_to_its_last(path, execute):

@@ -187,7 +187,6 @@ FAULTS = [
         "own = fresh",
     ),
 ]
-QUICK = FAULTS[:2]
 
 
 def passes_its_tests(folder: Path, tests: list[str] = TESTS) -> bool:
@@ -207,25 +206,20 @@ def copy(tmp_path):
     return tmp_path
 
 
-def check_is_caught(fault: Fault, copy: Path) -> None:
+@pytest.mark.slow
+def test_the_copy_without_a_fault_passes(copy):
+    assert passes_its_tests(copy)
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [FAULTS[0], *(pytest.param(fault, marks=pytest.mark.slow) for fault in FAULTS[1:])],
+    ids=lambda fault: fault.name,
+)
+def test_a_planted_fault_is_caught(fault, copy):
     file = copy / "atg_fg" / fault.file
     text = file.read_text()
     assert text.count(fault.right) == 1, f"{fault.file} has changed; expected once: {fault.right}"
     file.write_text(text.replace(fault.right, fault.wrong))
     tests = next((tests for folder, tests in TESTS_OF.items() if fault.file.startswith(folder)), TESTS)
     assert not passes_its_tests(copy, tests), f"not caught: {fault.name}"
-
-
-def test_the_copy_without_a_fault_passes(copy):
-    assert passes_its_tests(copy)
-
-
-@pytest.mark.parametrize("fault", QUICK, ids=lambda fault: fault.name)
-def test_a_planted_fault_is_caught(fault, copy):
-    check_is_caught(fault, copy)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("fault", FAULTS[len(QUICK) :], ids=lambda fault: fault.name)
-def test_every_planted_fault_is_caught(fault, copy):
-    check_is_caught(fault, copy)

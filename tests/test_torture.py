@@ -55,7 +55,7 @@ def test_damaged_files_are_refused_with_an_error_of_this_project() -> None:
     assert "180 of 180" in tortured(*only(files=180))
 
 
-@pytest.mark.skipif(find_spec("atheris") is None, reason="atheris has wheels for Linux alone")
+@pytest.mark.skipif(find_spec("atheris") is None, reason="atheris is not installed: pip install --group torture")
 def test_readers_are_fuzzed() -> None:
     assert "; 0 faults" in tortured(*only(fuzz=3))
 

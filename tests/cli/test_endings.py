@@ -55,8 +55,17 @@ def folder(tmp_path_factory):
     return made
 
 
-@pytest.mark.parametrize("buffered", [True, False])
-@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize(
+    ("command", "buffered"),
+    [
+        *(("help", buffered) for buffered in (True, False)),
+        *(("table", buffered) for buffered in (True, False)),
+        *(
+            pytest.param(command, buffered, marks=pytest.mark.slow)
+            for command in COMMANDS if command not in ("help", "table") for buffered in (True, False)
+        ),
+    ],
+)  # fmt: skip
 class TestOutput:
     def test_a_pipe_that_nobody_reads_ends_a_command_quietly(self, command, buffered, folder):
         read, write = os.pipe()

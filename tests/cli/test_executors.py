@@ -98,7 +98,7 @@ def where(name, request):
     ("name", "executor"),
     [
         *(("short table1", executor) for executor in ("process", "thread", "dask")),
-        ("goal", "process"),
+        pytest.param("goal", "process", marks=slow),
         pytest.param("figure3", "dask", marks=slow),
         pytest.param("ablation", "thread", marks=slow),
     ],

@@ -18,6 +18,8 @@ from tests.small import EXACT_ENGINES
 CHUNKS, CHUNK_SIZE = 20, 26
 #: They make the whole graph anew at each question, which takes long; they get fewer of the models.
 ROUTES, ROUTE_CHUNKS = [engine for engine in EXACT_ENGINES if engine.startswith("gtsam-")], 4
+#: The rest is slow.
+QUICK_CHUNKS, QUICK_ROUTE_CHUNKS = 4, 2
 TOLERANCE = 1e-12
 
 
@@ -99,10 +101,15 @@ def everything(inference: Inference) -> list[object]:
     return [belief.objects.tolist(), belief.unseen, belief.entropy, inference.log_evidence, smoothed]
 
 
-@pytest.mark.parametrize(
-    ("engine", "chunk"),
-    [(engine, chunk) for engine in EXACT_ENGINES for chunk in range(ROUTE_CHUNKS if engine in ROUTES else CHUNKS)],
-)
+def chunks():
+    """Yield each engine with each chunk of models; but for the first few, they are slow."""
+    for engine in EXACT_ENGINES:
+        n, n_quick = (ROUTE_CHUNKS, QUICK_ROUTE_CHUNKS) if engine in ROUTES else (CHUNKS, QUICK_CHUNKS)
+        for chunk in range(n):
+            yield pytest.param(engine, chunk, marks=[pytest.mark.slow] if chunk >= n_quick else [])
+
+
+@pytest.mark.parametrize(("engine", "chunk"), chunks())
 def test_every_exact_engine_gives_the_exact_posterior_at_every_step(engine: str, chunk: int) -> None:
     for seed in range(chunk * CHUNK_SIZE, (chunk + 1) * CHUNK_SIZE):
         case, course = trial_of(seed)
@@ -123,6 +130,7 @@ def test_every_exact_engine_gives_the_exact_posterior_at_every_step(engine: str,
                 assert_agrees(inference, next(steps)[1], f"model {seed}, action {time}")
 
 
+@pytest.mark.slow
 def test_the_random_models_cover_what_they_should() -> None:
     trials = [trial_of(seed) for seed in range(CHUNKS * CHUNK_SIZE)]
     every_case = [case for case, _ in trials]

@@ -117,7 +117,14 @@ class Reference:
         return result
 
 
-@pytest.mark.parametrize(("contents", "missing"), [((0, 1, 2), 0.0), ((0, 3, 1), 0.25), ((4, 2, 3), 0.0)])
+@pytest.mark.parametrize(
+    ("contents", "missing"),
+    [
+        pytest.param((0, 1, 2), 0.0, marks=pytest.mark.slow),
+        ((0, 3, 1), 0.25),
+        pytest.param((4, 2, 3), 0.0, marks=pytest.mark.slow),
+    ],
+)
 def test_it_is_close_to_the_exact_posterior_of_a_small_world(ring_memory, contents, missing):
     trial = trial_of(objects_of(RING, [contents])[0], 3, np.random.default_rng(1), slip=0.05, missing=missing)
     inference, reference = begin_trial("learned-structure", ring_memory, LEARNED), Reference(ring_memory.learner)

@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from atg_fg.core.belief import IdentityBelief
@@ -131,7 +131,6 @@ def test_three_objects_are_as_by_enumeration_of_actual_objects(learn: bool, whic
         assert recognition.log_evidence() == pytest.approx(log_evidence, abs=1e-12)
 
 
-@settings(max_examples=60)
 @given(cases(), st.integers(1, 3))
 def test_the_graph_is_the_sum_over_subsets(case: Case, n: int) -> None:
     trials = trials_of(case, n)

@@ -35,7 +35,8 @@ def cases():
                 yield pytest.param(world, name, quick, id=f"{world}-{name}-{quick}", marks=marks)
         for engine in able:
             if engine != quick:
-                yield pytest.param("ideal", name, engine, id=f"ideal-{name}-{engine}")
+                marks = [pytest.mark.slow] if name != "default" else []
+                yield pytest.param("ideal", name, engine, id=f"ideal-{name}-{engine}", marks=marks)
 
 
 def plan_of(world, name, engine):

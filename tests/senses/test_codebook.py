@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from atg_fg.core.errors import InvalidInputError
@@ -99,7 +99,6 @@ def test_once_all_numbers_are_given_no_class_is_new():
     assert book.posterior(np.array([50.0])).classes.sum() == pytest.approx(1)
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.data())
 def test_refitting_never_explains_the_looks_worse_and_adds_up(data):
     n = data.draw(st.integers(2, 14))
@@ -117,7 +116,6 @@ def test_refitting_never_explains_the_looks_worse_and_adds_up(data):
         assert book.sums[number] == pytest.approx(points[found == number].sum(axis=0), abs=1e-9)
 
 
-@settings(max_examples=60, deadline=None)
 @given(st.lists(st.tuples(st.integers(0, 3), st.floats(-9, 9)), min_size=1, max_size=12), st.floats(-9, 9))
 def test_beliefs_are_distributions_and_a_look_taken_out_leaves_no_trace(looks, look):
     book = Codebook(ONE_DIMENSION, 4, within=0.5)

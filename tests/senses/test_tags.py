@@ -2,7 +2,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from atg_fg.core.errors import InvalidInputError, UnknownNameError
@@ -152,7 +152,6 @@ def test_each_cell_counts_by_the_probability_that_it_was_read_wrong(detector):
 
 
 @given(st.integers(0, 5), st.lists(st.floats(0, 1), min_size=25, max_size=25), st.floats(0, 30))
-@settings(max_examples=40, deadline=None)
 def test_any_reading_gives_a_likelihood_that_can_be_learned_from(tag_id, whiteness, error):
     made = TagDetector(Tags("5X5_50", 0.05, symbols={tag: tag for tag in range(6)}))
     tag = read(np.reshape(whiteness, (5, 5)), tag_id, TagPose(np.zeros(3), np.eye(3), corner_error=error))

@@ -42,7 +42,9 @@ def cubes():
     return make_world("ideal", cubes=make_arcubes(4, 0), slip=0.1, wrong=0.2, missing=0.1)
 
 
-@pytest.fixture(scope="module", params=[detector, cubes], ids=["detector", "cubes"])
+@pytest.fixture(
+    scope="module", params=[detector, pytest.param(cubes, marks=pytest.mark.slow)], ids=["detector", "cubes"]
+)
 def learned(request):
     with closing(request.param()) as world:
         memory = memory_for(LEARNED, RobotMemory(assumptions_of(world, 4)))

@@ -90,7 +90,7 @@ def follow_both(case: Case, **options: Any) -> list[tuple[LargeMemory, Any]]:
     return [(tried, exact)]
 
 
-@settings(max_examples=150, deadline=None)
+@settings(max_examples=3 * settings.default.max_examples)
 @given(case=cases(), n_exact=st.sampled_from((0, 100)), kernels=st.sampled_from("01"))
 def test_no_random_model_is_further_off_than_the_bound_and_all_decisions_are_the_same(
     case: Case, n_exact: int, kernels: str

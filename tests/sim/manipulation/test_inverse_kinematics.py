@@ -1,6 +1,6 @@
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
@@ -40,7 +40,6 @@ def test_both_hands_on_a_cube_that_is_lifted_and_moved_are_reached(kinematics):
             assert solve(kinematics, task, HOME_POSTURE, HOME_POSTURE).reaches()
 
 
-@settings(max_examples=40)
 @given(pad=arrays(np.float64, (2, 3), elements=st.floats(-1.5, 1.5)), vectors=UNIT_VECTORS, shares=shares)
 def test_joint_limits_are_kept_and_misses_told_wherever_the_hands_are_sent(kinematics, pad, vectors, shares):
     normal = vectors / np.linalg.norm(vectors, axis=1, keepdims=True)

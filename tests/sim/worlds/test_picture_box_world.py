@@ -92,8 +92,15 @@ def test_classes_found_without_labels_are_the_pictures(world):
     assert len(found) <= len({picture for _, picture in found}) + 2
 
 
-@pytest.mark.parametrize("structured", [False, True])
-@pytest.mark.parametrize("name", ["memory.json", "memory.db"])
+@pytest.mark.parametrize(
+    ("name", "structured"),
+    [
+        ("memory.json", False),
+        ("memory.db", True),
+        pytest.param("memory.json", True, marks=pytest.mark.slow),
+        pytest.param("memory.db", False, marks=pytest.mark.slow),
+    ],
+)
 def test_what_a_memory_knows_of_appearances_is_saved_with_it(world, tmp_path, name, structured):
     memory = memory_of(world, structured)
     trials(world, memory, 3)
