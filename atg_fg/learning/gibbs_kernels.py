@@ -9,12 +9,14 @@ from atg_fg.inference.kernels.compilation import compiled
 from atg_fg.learning.kernels import (
     Clusters,
     TrialArrays,
+    copy_into,
     draw_by_logarithm,
     forget,
     learn_again,
     learn_all_again,
     log_product,
     look_up,
+    shuffled,
     take_in,
     walk,
 )
@@ -80,7 +82,8 @@ def trial_weights(
                 weights[cluster, start] = scale + log_product(clusters.tables[cluster], local, visited, n_visited)
     prior = cluster_weights(trials, trial, clusters, free, log_new)
     for cluster in range(len(prior)):
-        weights[cluster] += prior[cluster]
+        for start in range(n_states):
+            weights[cluster, start] += prior[cluster]
 
 
 @compiled
@@ -99,19 +102,19 @@ def transition_moves(
     n_actions, n_states = successors.shape[0] - 1, successors.shape[1]
     path, scores = np.empty(trials.looks.shape[1], np.int64), np.empty(n_states)
     passing, others = np.empty(len(trials.lengths), np.int64), np.empty_like(clusters.tables)
-    for entry in rng.permutation(n_actions * n_states)[:n_entries]:
+    for entry in shuffled(n_actions * n_states, rng)[:n_entries]:
         action, state = entry // n_states, entry % n_states
         # Only the trials that pass this entry say anything of it; what the others say of their objects stays.
         n_passing = learn_from_others(trials, clusters, automaton, action, state, path, passing)
         for position in range(n_passing):
             cluster = clusters.owner[passing[position]]
-            others[cluster] = clusters.tables[cluster]
+            copy_into(others[cluster], clusters.tables[cluster])
         for successor in range(n_states):
             successors[action, state] = successor
             scores[successor] = 0.0
             for position in range(n_passing):
                 cluster = clusters.owner[passing[position]]
-                clusters.tables[cluster] = others[cluster]
+                copy_into(clusters.tables[cluster], others[cluster])
             for position in range(n_passing):
                 trial = passing[position]
                 scores[successor] += take_in(trials, trial, clusters, clusters.owner[trial], path)
@@ -185,7 +188,8 @@ def trial_move(
     trial_weights(trials, trial, clusters, free, log_new[n_clusters], weights[:-1])
     if len(log_own) > 0:
         share = sharing(clusters)
-        weights[free] += np.log(share)
+        for start in range(n_states):
+            weights[free, start] += np.log(share)
         prior = cluster_weights(trials, trial, clusters, free, log_new[n_clusters])[free]
         weights[-1, 0] = prior + np.log(1.0 - share) + log_own[trial] + np.log(n_states)
     if len(votes) > 0:
@@ -232,7 +236,8 @@ def own_log_evidence(
     n_slots = trials.looks.shape[2]
     registers = np.arange(n_states * n_slots).reshape(n_states, n_slots)
     table = np.empty((n_states * n_slots, len(prior)))
-    table[:] = prior
+    for symbol in range(len(prior)):
+        table[:, symbol] = prior[symbol]
     local, visited = np.empty_like(table), np.empty(len(table), np.int64)
     path, logarithms = np.empty(trials.looks.shape[1], np.int64), np.empty(OWN_DRAWS)
     for number in range(OWN_DRAWS):

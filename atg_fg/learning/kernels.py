@@ -83,6 +83,31 @@ def draw_by_logarithm(logarithms: FloatArray, beta: float, rng: np.random.Genera
 
 
 @compiled
+def shuffled(n: int, rng: np.random.Generator) -> IntArray:
+    """Return the numbers below n in an order drawn as ``rng.permutation`` draws it, which takes seconds to compile."""
+    order = np.arange(n)
+    mask = 1
+    while mask < n:
+        mask *= 2
+    for last in range(n - 1, 0, -1):
+        while mask // 2 > last:
+            mask //= 2
+        other = last + 1
+        while other > last:
+            other = np.int64(rng.integers(0, 2**32, dtype=np.uint32)) & (mask - 1)
+        order[last], order[other] = order[other], order[last]
+    return order
+
+
+@compiled
+def copy_into(target: FloatArray, source: FloatArray) -> None:
+    """Copy a table of the same shape; ``target[:] = source`` compares the shapes, which takes seconds to compile."""
+    for row in range(source.shape[0]):
+        for column in range(source.shape[1]):
+            target[row, column] = source[row, column]
+
+
+@compiled
 def walk(successors: IntArray, actions: IntArray, length: int, start: int, path: IntArray) -> None:
     """Fill in the states that actions lead through."""
     path[0] = start
@@ -146,7 +171,8 @@ def fresh_log_evidence(
     n_trials, n_states = len(trials.lengths), len(registers)
     table = np.empty((n_registers, len(prior)))
     for register in range(n_registers):
-        table[register] = prior
+        for symbol in range(len(prior)):
+            table[register, symbol] = prior[symbol]
     local, visited = np.empty_like(table), np.empty(n_registers, np.int64)
     path, logarithms = np.empty(trials.looks.shape[1], np.int64), np.empty(n_states)
     result = np.empty(n_trials)
@@ -189,7 +215,8 @@ def take_in(trials: TrialArrays, trial: int, clusters: Clusters, cluster: int, p
 def forget(clusters: Clusters, cluster: int) -> None:
     """Set the table of a cluster back to the prior."""
     for register in range(clusters.tables.shape[1]):
-        clusters.tables[cluster, register] = clusters.prior
+        for symbol in range(len(clusters.prior)):
+            clusters.tables[cluster, register, symbol] = clusters.prior[symbol]
 
 
 @compiled

@@ -51,7 +51,8 @@ def log_evidence_of_each(
             total += step(own, constants, (aspects, log_identity, identity), action, evidence[time], learned, shown)
             if patterns[time] >= 0:
                 shown_pattern = patterns[time]
-        result[number] = log_identity + total
+        for row in range(n_rows):
+            result[number, row] = log_identity[row] + total
     return result
 
 
@@ -69,16 +70,19 @@ def share_out(table: FloatArray, before: FloatArray, n_rounds: int) -> tuple[Flo
     n_rows, n_kinds = table.shape
     likelihood = np.empty_like(table)
     for row in range(n_rows):
-        likelihood[row] = np.exp(table[row] - table[row].max())
+        most = table[row].max()
+        for kind in range(n_kinds):
+            likelihood[row, kind] = np.exp(table[row, kind] - most)
     total = before.sum()
     shares = before / total
     following = np.empty_like(table)
     for _ in range(n_rounds):
         expected = before.copy()
         for row in range(n_rows):
-            following[row] = likelihood[row] * shares
-            following[row] /= following[row].sum()
-            expected += following[row]
+            weight = (likelihood[row] * shares).sum()
+            for kind in range(n_kinds):
+                following[row, kind] = likelihood[row, kind] * shares[kind] / weight
+                expected[kind] += following[row, kind]
         shares = expected / (total + n_rows)
     bound = math.lgamma(total) - math.lgamma(total + n_rows)
     for kind in range(n_kinds):

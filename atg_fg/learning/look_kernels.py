@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.inference.kernels.compilation import compiled
 from atg_fg.learning.gibbs_kernels import count_votes, put_in, take_out, trial_weights
-from atg_fg.learning.kernels import Clusters, TrialArrays, draw_by_logarithm, walk
+from atg_fg.learning.kernels import Clusters, TrialArrays, copy_into, draw_by_logarithm, walk
 from atg_fg.learning.object_kernels import cluster_weights
 from atg_fg.learning.slip_kernels import slip_paths
 
@@ -68,7 +68,8 @@ def judge_looks(
         result += np.log(evidence)
         if wrong[time]:
             for slot in range(n_slots - 1, -1, -1):
-                table[registers[path[time], slot]] = before[slot]
+                for symbol in range(n_symbols):
+                    table[registers[path[time], slot], symbol] = before[slot, symbol]
     return result
 
 
@@ -82,7 +83,7 @@ def settle(
         if judged[time]:
             trials.looks[trial, time] = 1.0
         else:
-            trials.looks[trial, time] = looks[trial, time]
+            copy_into(trials.looks[trial, time], looks[trial, time])
 
 
 @compiled
@@ -132,10 +133,11 @@ def judged_move(
                 weights[cluster, first] = -np.inf
                 continue
             walk(clusters.successors[0], trials.actions[trial], length, first, path)
-            table[:] = clusters.tables[cluster]
+            copy_into(table, clusters.tables[cluster])
             number, forced = cluster * n_states + first, cluster == owner and first == start
             if forced:
-                judged[number] = wrong[trial]
+                for time in range(length):
+                    judged[number, time] = wrong[trial, time]
             weights[cluster, first] = judge_looks(
                 looks[trial], length, path, clusters.registers, table, rate, forced, judged[number], rng
             )
@@ -204,10 +206,11 @@ def judged_path_move(
             if scores[which, cluster] == -np.inf or (scores[which, cluster] < least and not forced):
                 scores[which, cluster] = -np.inf
                 continue
-            table[:] = clusters.tables[cluster]
+            copy_into(table, clusters.tables[cluster])
             number = which * scores.shape[1] + cluster
             if forced:
-                judged[number] = wrong[trial]
+                for time in range(length):
+                    judged[number, time] = wrong[trial, time]
             said = judge_looks(looks[trial], length, path, clusters.registers, table, rate, forced, judged[number], rng)
             scores[which, cluster] = paths.log_prior[which] + said + prior[cluster]
     count_votes(np.ascontiguousarray(scores.T), free, votes)

@@ -6,10 +6,7 @@ import numpy as np
 
 from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.inference.kernels.compilation import compiled
-from atg_fg.learning.kernels import (
-    TrialArrays,
-    draw_by_logarithm,
-)
+from atg_fg.learning.kernels import TrialArrays, copy_into, draw_by_logarithm, shuffled
 
 #: Maps whose evidence a chain has at hand: a later one takes the place of an earlier one.
 _N_KNOWN = 4093
@@ -40,7 +37,8 @@ def map_log_evidence(
             if time + 1 < trials.lengths[trial]:
                 for register in range(n_registers):
                     moved[register] = place[sources[trials.actions[trial, time], register]]
-                place[:] = moved
+                for register in range(n_registers):
+                    place[register] = moved[register]
         evidence = 0.0
         for register in range(n_registers):
             if is_seen[register]:
@@ -84,7 +82,7 @@ def anneal_maps(
     scored, known = np.empty(_N_KNOWN), np.full((_N_KNOWN, n_actions, n_registers), -1)
     for beta in coldness:
         for action in range(n_actions):
-            for register in rng.permutation(n_registers):
+            for register in shuffled(n_registers, rng):
                 mine = sources[action, register]
                 for option in range(n_options):
                     other = option % n_registers
@@ -110,7 +108,7 @@ def anneal_maps(
                         scores[option] -= copy_cost * count_losses(sources)
                     if scores[option] > best:
                         best = scores[option]
-                        kept[:] = sources
+                        copy_into(kept, sources)
                     sources[action, other], sources[action, register] = theirs, mine
                 option = draw_by_logarithm(scores, beta, rng)
                 other = option % n_registers
@@ -118,7 +116,7 @@ def anneal_maps(
                     sources[action, register], sources[action, other] = sources[action, other], mine
                 else:
                     sources[action, register] = other
-    sources[:] = kept
+    copy_into(sources, kept)
     return best
 
 

@@ -10,11 +10,7 @@ from numpy.typing import NDArray
 from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.inference.kernels.compilation import compiled
 from atg_fg.learning.gibbs_kernels import count_votes, log_total, put_in, take_out, trial_weights
-from atg_fg.learning.kernels import (
-    Clusters,
-    TrialArrays,
-    draw_by_logarithm,
-)
+from atg_fg.learning.kernels import Clusters, TrialArrays, copy_into, draw_by_logarithm
 from atg_fg.learning.object_kernels import cluster_weights
 
 #: Paths with slips that are followed at once, and how improbable one may be beside the best.
@@ -116,9 +112,11 @@ def slip_paths(
                     break
                 state[n_paths], start[n_paths] = state[path], start[path]
                 log_prior[n_paths] = log_prior[path] + log_slip
-                slipped[n_paths] = slipped[path]
+                for earlier in range(time - 1):
+                    slipped[n_paths, earlier] = slipped[path, earlier]
                 slipped[n_paths, time - 1] = True
-                local[n_paths], factors[n_paths] = local[path], factors[path]
+                copy_into(local[n_paths], local[path])
+                copy_into(factors[n_paths], factors[path])
                 n_paths += 1
             for path in range(n_old):
                 state[path] = clusters.successors[0, done[time - 1], state[path]]
@@ -156,9 +154,14 @@ def slip_paths(
                 n_kept += 1
         kept = kept[:n_kept]
         if n_kept < n_paths:
-            state[:n_kept], start[:n_kept], log_prior[:n_kept] = state[kept], start[kept], log_prior[kept]
-            slipped[:n_kept], local[:n_kept] = slipped[kept], local[kept]
-            factors[:n_kept], scores[:n_kept] = factors[kept], scores[kept]
+            old_state, old_start, old_prior = state[kept], start[kept], log_prior[kept]
+            old_local, old_factors = local[kept], factors[kept]
+            for path in range(n_kept):
+                state[path], start[path], log_prior[path] = old_state[path], old_start[path], old_prior[path]
+                copy_into(local[path], old_local[path])
+                copy_into(factors[path], old_factors[path])
+            copy_into(slipped, slipped[kept])
+            copy_into(scores, scores[kept])
             n_paths = n_kept
     return Paths(slipped[:n_paths].copy(), start[:n_paths].copy(), log_prior[:n_paths].copy()), scores[:n_paths].copy()
 
