@@ -9,9 +9,10 @@ This module is loaded where something is sampled, and not before: it takes longe
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.inference.kernels.compilation import compiled
@@ -92,7 +93,7 @@ def shuffled(n: int, rng: np.random.Generator) -> IntArray:
     for last in range(n - 1, 0, -1):
         while mask // 2 > last:
             mask //= 2
-        other = last + 1
+        other = np.int64(last + 1)
         while other > last:
             other = np.int64(rng.integers(0, 2**32, dtype=np.uint32)) & (mask - 1)
         order[last], order[other] = order[other], order[last]
@@ -100,7 +101,7 @@ def shuffled(n: int, rng: np.random.Generator) -> IntArray:
 
 
 @compiled
-def copy_into(target: FloatArray, source: FloatArray) -> None:
+def copy_into(target: NDArray[Any], source: NDArray[Any]) -> None:
     """Copy a table of the same shape; ``target[:] = source`` compares the shapes, which takes seconds to compile."""
     for row in range(source.shape[0]):
         for column in range(source.shape[1]):
