@@ -35,15 +35,17 @@ def only(**parts: int) -> list[str]:
 
 
 def test_a_killed_writer_leaves_every_trial_that_it_said_was_written() -> None:
-    assert "36 of 36" in tortured(*only(kills=36))
+    assert "12 of 12" in tortured(*only(kills=12))
 
 
+@pytest.mark.slow
 def test_a_power_cut_leaves_every_trial_that_was_said_to_be_kept() -> None:
     output = tortured(*only(cuts=1))
     assert "log of trials: " in output
     assert output.endswith("0 faults, seed 1\n")
 
 
+@pytest.mark.slow
 def test_a_full_disk_and_a_read_only_folder_leave_the_old_state() -> None:
     output = tortured(*only(points=1, commands=6))
     assert "full, database: 1 well" in output
@@ -52,9 +54,10 @@ def test_a_full_disk_and_a_read_only_folder_leave_the_old_state() -> None:
 
 
 def test_damaged_files_are_refused_with_an_error_of_this_project() -> None:
-    assert "180 of 180" in tortured(*only(files=180))
+    assert "60 of 60" in tortured(*only(files=60))
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(find_spec("atheris") is None, reason="atheris is not installed: pip install --group torture")
 def test_readers_are_fuzzed() -> None:
     assert "; 0 faults" in tortured(*only(fuzz=3))

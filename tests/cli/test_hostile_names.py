@@ -11,9 +11,8 @@ from hypothesis import strategies as st
 
 from atg_fg import cli
 from atg_fg.core.visible_text import visible
-from atg_fg.storage import memory_files, memory_json
+from atg_fg.storage import memory_files, memory_json, packaged
 from sim import cli as sim_cli
-from tests.learning.boxes import box_memory
 from tests.storage.database.small import plain
 
 #: What rich, matplotlib, a terminal, Markdown, XML or DOT would take for something else than a name.
@@ -118,7 +117,7 @@ def test_every_command_shows_names_in_a_script_as_they_are(shown, tmp_path, name
 )
 def test_structures_are_told_and_drawn_with_any_names(shown, tmp_path, name):
     file = tmp_path / "memory.json"
-    memory = box_memory()
+    memory = memory_json.memory_from_json(packaged.example_memory(), "example")
     names = (memory.names[0], name), (memory.assumptions.actions[0], f"{name}+"), ("top", f"{name}-")
     file.write_text(renamed(memory, *names))
     for kind in ("png", "svg"):

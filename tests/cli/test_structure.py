@@ -47,6 +47,7 @@ def test_structure_and_completed_graphs_are_drawn_and_exported(run, file, tmp_pa
     assert exported.count("<node ") == 24
 
 
+@pytest.mark.slow
 def test_what_an_irreversible_action_loses_is_said_and_drawn(run, tmp_path):
     file, memory = tmp_path / "memory.json", box_memory()
     memory_files.save_memory(memory, file)
