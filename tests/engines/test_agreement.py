@@ -109,7 +109,7 @@ def chunks():
             yield pytest.param(engine, chunk, marks=[pytest.mark.slow] if chunk >= n_quick else [])
 
 
-@pytest.mark.parametrize(("engine", "chunk"), chunks())
+@pytest.mark.parametrize(("engine", "chunk"), list(chunks()))
 def test_every_exact_engine_gives_the_exact_posterior_at_every_step(engine: str, chunk: int) -> None:
     for seed in range(chunk * CHUNK_SIZE, (chunk + 1) * CHUNK_SIZE):
         case, course = trial_of(seed)

@@ -1,0 +1,78 @@
+"""Pictures beside a record: of each look, and the crops that stand for symbols."""
+
+import base64
+import struct
+
+import pytest
+
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.report.reading import read_report
+from tests.report.test_reading import changed
+
+
+def test_pictures_come_from_the_records_folder_alone(record, tmp_path):
+    secret = tmp_path.parent / f"{tmp_path.name}.png"
+    secret.write_bytes(b"\x89PNG\r\n\x1a\n")
+    (tmp_path / "text.png").write_text("no picture")
+    (tmp_path / "link.png").symlink_to(secret)
+    for frame in (f"../{secret.name}", str(secret), "text.png", "link.png", "absent.png", 7, "", "a\0b"):
+        changed(record, lambda lines, frame=frame: lines[1].update(frame=frame))
+        with pytest.raises(InvalidInputError, match=r"line 2: frame: .* (expected|cannot be read)"):
+            read_report(record)
+    (tmp_path / "good.png").write_bytes(b"\x89PNG\r\n\x1a\nrest")
+    changed(record, lambda lines: lines[1].update(frame="good.png"))
+    assert read_report(record).trials[0].looks[0].frame == "data:image/png;base64,iVBORw0KGgpyZXN0"
+
+
+def png(side, size=100):
+    """The beginning of a PNG of so many pixels a side, filled up to a size."""
+    return (b"\x89PNG\r\n\x1a\n\0\0\0\rIHDR" + struct.pack(">II", side, side)).ljust(size, b"\0")
+
+
+def test_the_crop_that_shows_a_symbol_most_surely_stands_for_it(record, tmp_path):
+    for name in "abc":
+        (tmp_path / f"{name}.png").write_bytes(png(48) + name.encode())
+
+    looks = (([3, None], ["a.png", None], [0.5, None]), ([4, 3], ["b.png", "c.png"], [0.9, 0.9]))
+
+    def change(lines):
+        for line, (observed, crops, sure) in zip(lines[1:], looks, strict=False):
+            line.update(observed=observed, crops=crops, truth={**line["truth"], "confidences": sure})
+
+    changed(record, change)
+    (page,) = read_report(record).trials
+    assert page.thumbnails == {
+        symbol: "data:image/png;base64," + base64.b64encode(png(48) + name).decode()
+        for symbol, name in ((3, b"c"), (4, b"b"))
+    }
+
+
+@pytest.mark.parametrize(
+    ("crops", "message"),
+    [
+        ("a.png", "crops: 'a.png'; expected a list"),
+        (["good.png"], "crops: 1 entries; expected 2"),
+        (["good.png", "../good.png"], r"crops\[1\]: '../good.png'; expected a path inside"),
+        (["large.png", None], r"crops\[0\]: 'large.png'; expected a PNG of at most 256 pixels a side"),
+        (["none.png", None], r"crops\[0\]: 'none.png'; expected a PNG of at most 256 pixels a side"),
+        (["photo.jpg", None], r"crops\[0\]: 'photo.jpg'; expected a PNG of at most"),
+        (["heavy.png", None], r"crops\[0\]: 'heavy.png'; expected a PNG or JPEG picture of at most 200,000 bytes"),
+        ([7, None], r"crops\[0\]: 7; expected the path"),
+    ],
+)
+def test_a_crop_that_is_no_small_picture_is_refused(record, tmp_path, crops, message):
+    pictures = {"good": png(48), "large": png(257), "none": png(0), "heavy": png(48, 200_001)}
+    for name, content in pictures.items():
+        (tmp_path / f"{name}.png").write_bytes(content)
+    (tmp_path / "photo.jpg").write_bytes(b"\xff\xd8\xff")
+    changed(record, lambda lines: lines[1].update(crops=crops))
+    with pytest.raises(InvalidInputError, match=f"line 2: {message}"):
+        read_report(record)
+
+
+@pytest.mark.parametrize("stated", [7, "sure", [1.0], [2.0, None], ["a", None], {"front": 1.0}])
+def test_confidences_beside_crops_are_checked(record, tmp_path, stated):
+    (tmp_path / "good.png").write_bytes(png(48))
+    changed(record, lambda lines: lines[1].update(crops=["good.png", None], truth={"confidences": stated}))
+    with pytest.raises(InvalidInputError, match="line 2: truth: confidences"):
+        read_report(record)
