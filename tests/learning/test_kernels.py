@@ -26,6 +26,13 @@ def drawn_trials(rng, n_trials=4, n_looks=4):
     return TrialArrays(looks, actions, np.full(n_trials, n_looks))
 
 
+def test_numbers_are_shuffled_as_numpy_shuffles_them():
+    rng, reference = np.random.default_rng(0), np.random.default_rng(0)
+    for n in (1, 2, 3, 8, 9, 30):
+        assert kernels.shuffled(n, rng).tolist() == reference.permutation(n).tolist()
+        assert rng.random() == reference.random()
+
+
 def likelihood(trials, trial, contents, start, slips=()):
     """p(looks | contents, start, slips), look by look."""
     state, result = start, 1.0
