@@ -31,10 +31,11 @@ def goal(
     engine: options.PresetsEngine = None,
     preset: options.Preset = "default",
     cubes: Annotated[
-        int, typer.Option(help="Cubes before the robot, each at a station.", rich_help_panel=options.WORLD)
+        int, typer.Option(min=1, help="Cubes before the robot, each at a station.", rich_help_panel=options.WORLD)
     ] = 3,
     memory_cubes: Annotated[
-        int, typer.Option(help="Cubes that the memory is learned from, these among them.", rich_help_panel=_MEMORY)
+        int,
+        typer.Option(min=1, help="Cubes that the memory is learned from, these among them.", rich_help_panel=_MEMORY),
     ] = 20,
     learning_actions: Annotated[
         int,

@@ -1,6 +1,7 @@
-"""The program ``atg-fg``: Ctrl-C ends it from its first moment on, also while libraries are loaded.
+"""The program ``atg-fg``: Ctrl-C ends it from its first line on, also while libraries are loaded.
 
-It is installed beside the package, as ``atg_fg_program``: ``atg_fg.cli.program`` would import ``atg_fg`` first.
+Before that, while Python itself begins, it is Python that answers, and no program can change that. It is installed
+beside the package, as ``atg_fg_program``: ``atg_fg.cli.program`` would import ``atg_fg`` first.
 """
 
 import os

@@ -47,7 +47,7 @@ def test_a_world_with_a_camera_is_filmed(run, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["--cubes", "0"], "n_stations: 0"),
+        (["--cubes", "0"], "Invalid value for '--cubes'"),
         (["--cubes", "9"], "n_stations: 9; expected at most n_remembered = 5"),
         (["--trials", "0"], "'--trials': Input should be greater than or equal to"),
         (["--planner", "fast"], "'fast'; expected one of: attempts, surprise, value-iteration"),
