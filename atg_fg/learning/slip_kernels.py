@@ -44,20 +44,20 @@ def slip_moves(
     path, stay = np.empty(trials.looks.shape[1], np.int64), clusters.successors.shape[1] - 1
     free, n_clusters = take_out(trials, trial, clusters, path)
     weights = np.empty((len(clusters.n_trials), len(clusters.registers)))
+    toggled = np.empty_like(weights)
     trial_weights(trials, trial, clusters, free, log_new[n_clusters], weights)
     before = log_total(weights.ravel())
     for _ in range(n_tries if trials.lengths[trial] > 1 else 0):
         time = rng.integers(0, trials.lengths[trial] - 1)
         old = trials.actions[trial, time]
         trials.actions[trial, time] = done[time] if old == stay else stay
-        trial_weights(trials, trial, clusters, free, log_new[n_clusters], weights)
-        after = log_total(weights.ravel())
+        trial_weights(trials, trial, clusters, free, log_new[n_clusters], toggled)
+        after = log_total(toggled.ravel())
         gain = after - before + (log_odds if old != stay else -log_odds)
         if rng.random() < 1.0 / (1.0 + np.exp(-gain)):
-            before = after
+            before, weights, toggled = after, toggled, weights
         else:
             trials.actions[trial, time] = old
-    trial_weights(trials, trial, clusters, free, log_new[n_clusters], weights)
     drawn = draw_by_logarithm(weights.ravel(), 1.0, rng)
     put_in(trials, trial, clusters, drawn // weights.shape[1], drawn % weights.shape[1], path)
 
