@@ -16,6 +16,8 @@ from atg_fg.core.patterns import FloatArray, IntArray
 WRONG_PRIOR: Final = (1.0, 9.0)
 #: Beta prior of a label that is wrong though not all of its look is.
 ALONE_PRIOR: Final = (1.0, 49.0)
+#: If more labels than this are wrong alone, it may be the structure that errs.
+EXPECTED_ALONE: Final = ALONE_PRIOR[0] / sum(ALONE_PRIOR)
 #: How many looks the mean of all confidences counts for in each bin.
 BIN_PRIOR: Final = 2.0
 #: How many wrong labels of each symbol the uniform distribution over the other symbols counts for.
@@ -43,7 +45,7 @@ class DetectorNoise:
     right: FloatArray
     confusion: FloatArray
     wrong: float
-    alone: float = ALONE_PRIOR[0] / sum(ALONE_PRIOR)
+    alone: float = EXPECTED_ALONE
 
     @classmethod
     def unknown(cls, n_symbols: int) -> DetectorNoise:

@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Final, NamedTuple
 import numpy as np
 
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.learning.detector_noise import DetectorNoise
+from atg_fg.learning.detector_noise import EXPECTED_ALONE, DetectorNoise
 from atg_fg.learning.learner import StructureLearner
 from atg_fg.learning.raw_trials import RawTrial, Recording
 from atg_fg.learning.saved_chain import SavedChain
@@ -217,12 +217,17 @@ class EvidenceLearner:
 
     @property
     def is_mistaken(self) -> bool:
-        """Whether what the best chain takes for wrong labels recurs, as a structure's mistakes do, or is too much."""
+        """Whether what the best chain takes for wrong labels recurs, as a structure's mistakes do, or is too much.
+
+        Where looks are judged, labels that are wrong alone have to be more than expected, too.
+        """
         state, best = self._current, self.best()
         if best is None:
             return False
         if state.noise.wrong > MOST_WRONG:
             return True
+        if best.judges and state.noise.alone <= EXPECTED_ALONE:
+            return False
         return best.log_odds_of_mistakes(self._task(self.learner.trials, state.noise)) > 0
 
     def log_gain_over_chance(self) -> FloatArray:

@@ -16,7 +16,7 @@ from atg_fg.core.errors import TooLargeError
 from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.learning import kernels
 from atg_fg.learning.chain import Chain
-from atg_fg.learning.detector_noise import ALONE_PRIOR, DetectorNoise
+from atg_fg.learning.detector_noise import EXPECTED_ALONE, DetectorNoise
 from atg_fg.learning.milestones import is_milestone
 from atg_fg.learning.raw_trials import Recording
 from atg_fg.learning.register_search import search_registers
@@ -32,8 +32,6 @@ MAPS_WITHIN: Final = 12.0
 MAP_SWEEPS: Final = 5
 #: Trials from which on a map that is left alone is settled.
 SETTLED_TRIALS: Final = 3
-#: Unless more labels than this are wrong where the rest of their look is right: it is the maps then that err.
-EXPECTED_ALONE: Final = ALONE_PRIOR[0] / sum(ALONE_PRIOR)
 
 
 class Conclusion(NamedTuple):
@@ -220,8 +218,8 @@ class RegisterPopulation(Population):
 
     def log_evidence(self, task: Task) -> float:
         """Return ln p(all trials, each of a fresh object) + ln p(maps) of the best maps."""
-        best = max(range(len(self.chains)), key=lambda number: self.chains[number].score)
-        return self._total(task, self.chains[best].structure, self.maps[best].log_prior)
+        best = max(self.chains, key=lambda chain: chain.score)
+        return float(best.fresh_log_evidence(task).sum()) + best.log_prior
 
     def saved(self, recording: Recording) -> list[SavedChain]:
         """Return the chains as they are kept."""
@@ -254,7 +252,7 @@ class RegisterPopulation(Population):
         n_trials = len(task.recording.lengths)
         is_settled = n_trials > SETTLED_TRIALS and len(self.chains) == 1
         if is_settled and n_trials.bit_count() > 1 and task.alone <= EXPECTED_ALONE:
-            return  # as much as the detector errs, its errors are not the maps'
+            return  # looks err as a whole: that is the detector's doing, not the maps'
         trials = kernels.TrialArrays(task.looks, task.recording.actions, task.recording.lengths)
         nothing_else = np.full(n_trials, -np.inf)
         found = search_registers(trials, nothing_else, self._n_slots, self._n_actions, 1 if is_settled else 2, rng)

@@ -118,10 +118,11 @@ class StructuredMemory(RobotMemory):
         trial = RawTrial(tuple(detections), tuple(actions), tuple(confidences), tuple(likelihoods), felt)
         trial.check(self.assumptions)
         before = self.gain if len(self.learner.trials) >= FIRST_TRIALS else 0.0
-        # A model that is far behind rests; it looks at all trials again whenever their number has doubled.
+        # A model that is far behind rests; it looks at all trials again whenever their number has doubled. One that is
+        # mistaken goes on: once it knows more, it may take for wrong looks what were errors of single labels before.
         has_doubled = (len(self.learner.trials) + 1).bit_count() == 1
         self.learner.learn(self[name].name, trial, rests=before > OUTDONE and not has_doubled)
-        if before > -OUTDONE or has_doubled:
+        if before > -OUTDONE or before == MISTAKEN or has_doubled:
             self.evidence.learn()
             self._weigh(anew=before <= OUTDONE or has_doubled)
             if self.erring and not taught:
@@ -294,7 +295,7 @@ class StructuredMemory(RobotMemory):
         if not self.assumptions.alphabet.exclusive:
             return np.inf
         # Trials that came in a file without what was sampled are not sampled before there is another one.
-        return MISTAKEN if self.learner.trials else 0.0
+        return 2 * MISTAKEN if self.learner.trials else 0.0
 
     def _weigh(self, *, anew: bool) -> None:
         """Weigh the models against each other, or, if not anew, see whether errors are a structure's mistakes."""
