@@ -1,13 +1,14 @@
 """What would simpler means make of boxes without tags? Baselines beside `table1 --world picture-box`.
 
-Run with ``python benchmarks/appearance.py [TESTS]``. Tests of 100 trials, 10 actions, seeds from 0; 95 % Wilson
-intervals over all trials. The baselines:
+Run with ``python benchmarks/appearance.py [TESTS [WORLD]]``. Tests of 100 trials, 10 actions, seeds from 0; 95 % Wilson
+intervals over all trials. The worlds are ``picture-box``; ``look-alikes``, a third of whose boxes look the same as
+another one; and ``meshes``. The baselines:
 
 * nearest neighbour: an object is the one that a remembered look is nearest to, or new if that is too far; the threshold
   is the one that does best on these very tests. Of the last look alone, or of all looks of a trial on average;
 * a bag of looks: classes found as usual, preset ``default``, but actions say nothing (α so large that all aspects
   follow alike);
-* a fixed codebook: classes of the pictures of other boxes, preset ``default``.
+* a fixed codebook: classes of the looks of other boxes or things, preset ``default``.
 """
 
 from __future__ import annotations
@@ -22,6 +23,7 @@ import numpy as np
 from rich.console import Console
 from rich.table import Table
 
+from atg_fg.core.checks import one_of
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import FloatArray
@@ -37,6 +39,12 @@ from atg_fg.storage.presets import preset
 from atg_fg.worlds.base import World
 from atg_fg.worlds.registry import assumptions_of, make_world_with, sense_of
 
+#: Name and options of each world.
+WORLDS: Final[dict[str, tuple[str, dict[str, Any]]]] = {
+    "picture-box": ("picture-box", {}),
+    "look-alikes": ("picture-box", {"look_alikes": 0.33, "differ_in": "weight"}),
+    "meshes": ("meshes", {}),
+}
 N_TRIALS: Final = 100
 N_ACTIONS: Final = 10
 _THRESHOLDS: Final = 60
@@ -45,6 +53,8 @@ _NO_TRANSITIONS: Final = 1e9
 #: Seeds of boxes whose pictures make the fixed codebook: there are more numbers of classes than pictures on the boxes
 #: of one world.
 _OTHER_WORLDS: Final = (888_888, 999_999)
+#: Looks at each of these.
+_OTHER_LOOKS: Final = 800
 
 
 class ClosedCodebook(Codebook):
@@ -87,19 +97,19 @@ class FixedCodebookPlan(TestPlan):
     """A test in which the classes of appearance were made beforehand."""
 
     def make_world(self, objects_seed: int) -> World:
-        """Return the plan's world, with a sense of pictures that are on none of its boxes."""
+        """Return the plan's world, with a sense of looks that none of its objects has."""
         world = super().make_world(objects_seed)
         own: Any = world.unwrapped
-        own.sense = ClosedSense.of(own.sense, _other_pictures(own), 8)
+        own.sense = ClosedSense.of(own.sense, _other_looks(own, self.world), 8)
         return world
 
 
-def _other_pictures(world: Any) -> FloatArray:
-    """Return mean looks, encoded, at as many pictures of another world as there are numbers of classes."""
+def _other_looks(world: Any, name: str) -> FloatArray:
+    """Return mean looks, encoded, of as many kinds in another world as there are numbers of classes."""
     looks: dict[tuple[int, int], list[FloatArray]] = {}
     for objects_seed in _OTHER_WORLDS:
-        with closing(make_world_with("picture-box", 60, objects_seed)) as other:
-            for seed in range(400):
+        with closing(make_world_with(name, 60, objects_seed)) as other:
+            for seed in range(_OTHER_LOOKS // len(world.alphabet.slots)):
                 observation, info = other.reset(seed=seed)
                 seen: Any = observation
                 for features, picture in zip(seen["appearance"], info["pattern"], strict=True):
@@ -107,11 +117,11 @@ def _other_pictures(world: Any) -> FloatArray:
     return np.array([np.mean(each, axis=0) for each in looks.values()][: world.alphabet.n_symbols])
 
 
-def random_trials(seed: int) -> list[tuple[int, FloatArray]]:
+def random_trials(seed: int, name: str, options: dict[str, Any]) -> list[tuple[int, FloatArray]]:
     """Return the object and all readings, shape [T, slots · D], of each trial of a test with random actions."""
     objects_seed, *trial_seeds = np.random.SeedSequence(seed).spawn(1 + N_TRIALS)
     trials = []
-    with closing(make_world_with("picture-box", 100, int(objects_seed.generate_state(1)[0]))) as world:
+    with closing(make_world_with(name, 100, int(objects_seed.generate_state(1)[0]), **options)) as world:
         memory = RobotMemory(assumptions_of(world, 100), sense=sense_of(world))
         for each in trial_seeds:
             inference = begin_trial("bayes-filter", memory, preset("default"))
@@ -160,21 +170,23 @@ def _right(trials: Sequence[tuple[int, FloatArray]], distances: FloatArray, thre
 def main() -> None:
     """Print the table."""
     n_tests = int(sys.argv[1]) if len(sys.argv) > 1 else 10
+    shown = one_of(sys.argv[2], "world", WORLDS) if len(sys.argv) > 2 else "picture-box"
+    name, options = WORLDS[shown]
     total = n_tests * N_TRIALS
-    tests = [random_trials(seed) for seed in range(n_tests)]
+    tests = [random_trials(seed, name, options) for seed in range(n_tests)]
     rows = [
         ("nearest neighbour, last look", nearest_neighbour(tests, last=True)),
         ("nearest neighbour, all looks", nearest_neighbour(tests, last=False)),
     ]
-    usual = TestPlan(world="picture-box", engine="bayes-filter")
+    usual = TestPlan(world=name, world_options=options, engine="bayes-filter")
     plans = (
         ("bag of looks", replace(usual, parameters=ModelParameters(_NO_TRANSITIONS, 1e-8))),
-        ("fixed codebook, preset default", FixedCodebookPlan(world=usual.world, engine=usual.engine)),
+        ("fixed codebook, preset default", FixedCodebookPlan(world=name, world_options=options, engine=usual.engine)),
         ("classes found, preset default", usual),
     )
     rows += [(name, sum(run_test(plan, seed).success[0] for seed in range(n_tests))) for name, plan in plans]
     table = Table(title=f"{n_tests} tests of {N_TRIALS} trials, seeds 0 to {n_tests - 1}", title_justify="left")
-    table.add_column("picture boxes")
+    table.add_column(shown)
     table.add_column("success, %", justify="right")
     for name, right in rows:
         low, high = wilson_interval(right, total)
