@@ -105,8 +105,8 @@ FAULTS = [
     Fault(
         "evidence of the look before used for the look",
         "inference/chain.py",
-        "likelihood = model.likelihood(evidence)",
-        "likelihood = model.likelihood(history.evidence[max(step - 1, 0)])",
+        "likelihood = model.pattern_likelihood(evidence)",
+        "likelihood = model.pattern_likelihood(history.evidence[max(step - 1, 0)])",
     ),
     Fault(
         "expected entropy without its unseen objects",
@@ -117,20 +117,20 @@ FAULTS = [
     Fault(
         "compiled: an aspect found takes all of the collection node",
         "inference/kernels/belief_kernels.py",
-        "revealed = aspects[hypothesis, 0] * (1.0 if target == constants.n_aspects else share)",
+        "revealed = aspects[hypothesis, 0] * (1.0 if target == n_aspects else truth / (truth + noise))",
         "revealed = aspects[hypothesis, 0]",
     ),
     Fault(
         "compiled: a state shows its pattern without noise",
         "inference/kernels/belief_kernels.py",
-        "aspects[hypothesis, state] * (observed * evidence[pattern] + noise)",
-        "aspects[hypothesis, state] * (observed * evidence[pattern])",
+        "aspects[hypothesis, state] *= (observed * evidence[pattern[hypothesis, state]] + noise) * scale",
+        "aspects[hypothesis, state] *= (observed * evidence[pattern[hypothesis, state]]) * scale",
     ),
     Fault(
         "compiled: a new edge out of its order",
-        "inference/kernels/belief_kernels.py",
-        "while place > first and not _precedes(tables, place - 1, action, target, source):",
-        "while False:",
+        "inference/kernels/table_kernels.py",
+        "while place > first and (",
+        "while False and (",
     ),
     Fault(
         "merging: states of different slots are one",

@@ -11,8 +11,9 @@ from typing import Any
 import numpy as np
 
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.inference.kernels.belief_kernels import BEGIN, step, weigh_all
+from atg_fg.inference.kernels.belief_kernels import BEGIN, step
 from atg_fg.inference.kernels.compilation import compiled
+from atg_fg.inference.kernels.table_kernels import weigh_all
 
 
 @compiled

@@ -14,8 +14,8 @@ from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.compact.compact_memory import GraphArrays
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, FloatArray
-from atg_fg.inference.kernels import belief_kernels as kernels
 from atg_fg.inference.kernels import decision_kernels
+from atg_fg.inference.kernels import table_kernels as kernels
 from atg_fg.inference.kernels.compiled_filter import CompiledRows, LookedAt
 from atg_fg.inference.kernels.memory_tables import ROOM, TrialArrays, empty_tables, types_for
 

@@ -14,7 +14,7 @@ from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.compact.columns import positions
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.patterns import FloatArray
-from atg_fg.inference.kernels.belief_kernels import Tables, write_row
+from atg_fg.inference.kernels.table_kernels import Tables, write_row
 
 #: Room that each row has for the aspects and edges that a trial finds, before rows have to be moved.
 ROOM: Final = 12
