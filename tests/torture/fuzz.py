@@ -18,7 +18,7 @@ import time
 from pathlib import Path
 from typing import Any
 
-from tests.torture.originals import packed, unpacked
+from tests.torture.originals import packed
 
 CORPUS = Path(__file__).parent / "corpus"
 #: Kinds in the order of the byte that says them; a new one is put at the end, as the corpus tells them by number.
@@ -38,11 +38,6 @@ _SECONDS, _MEBIBYTES = 60, 2048
 
 #: Kinds whose lines are packed each by itself.
 _PACKED = ("test log", "goal run")
-
-
-def as_input(kind: str, content: bytes) -> bytes:
-    """Return the input that stands for a file."""
-    return bytes([KINDS.index(kind)]) + (b"\n".join(unpacked(content)) if kind in _PACKED else content)
 
 
 def as_file(data: bytes) -> tuple[str, bytes]:
