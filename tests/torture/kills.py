@@ -75,7 +75,7 @@ class Course:
         if isinstance(memory, StructuredMemory):
             # No search: it is the writing that is to be cut off.
             learn = memory.learner.learn
-            memory.learner.learn = lambda owner, trial, search: learn(owner, trial, search=False)
+            memory.learner.learn = lambda owner, trial, rests: learn(owner, trial, rests=True)
         return memory
 
 
