@@ -19,7 +19,8 @@ from typing import Any
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.storage.checked_json import parse_json, plain_json
 from atg_fg.storage.limits import gzip_members
-from atg_fg.storage.plain_files import check_writable, read_bytes_file, write_all, write_bytes_atomically
+from atg_fg.storage.named_pipes import write_all
+from atg_fg.storage.plain_files import check_writable, read_bytes_file, write_bytes_atomically
 
 
 class GrowingFile:

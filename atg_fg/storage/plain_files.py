@@ -8,13 +8,11 @@ nothing to replace.
 from __future__ import annotations
 
 import contextlib
-import errno
 import os
 import secrets
 import stat
 import sys
 import tempfile
-import time
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -23,6 +21,7 @@ from typing import IO, Final
 
 from atg_fg.core.errors import AtgError, InvalidInputError, TooLargeError
 from atg_fg.storage.limits import MAX_FILE_BYTES, MAX_UNPACKED_BYTES, byte_limit, gzip_members, refuse_size
+from atg_fg.storage.named_pipes import PART, begin_of_pipe, open_without_waiting, write_all, write_in_place
 
 try:
     import fcntl
@@ -37,19 +36,6 @@ GZIP: Final = b"\x1f\x8b"
 _TEMPORARY: Final = (".atg-fg-", ".tmp")
 
 
-#: Seconds in which someone must open the other end of a named pipe; who has it open may take their time.
-PIPE_WAIT: Final = 5.0
-
-
-#: Bytes that are read at once from what has no size, and seconds between two looks whether someone writes.
-_PART: Final = 2**20
-_POLL: Final = 0.02
-
-
-#: Flag of opening that does not wait for the other end; Windows has no such pipes.
-_NOT_WAITING: Final = getattr(os, "O_NONBLOCK", 0)
-
-
 #: Links that are followed in search of an open descriptor; the kernel follows no more.
 _MOST_LINKS: Final = 40
 
@@ -62,13 +48,13 @@ def read_bytes_file(path: Path | str) -> bytes:
         TooLargeError: More than ``MAX_FILE_BYTES``, or than ``MAX_UNPACKED_BYTES`` from what has no size.
     """
     try:
-        with open(path, "rb", opener=_open_without_waiting) as file:
+        with open(path, "rb", opener=open_without_waiting) as file:
             status = os.fstat(file.fileno())
             plain = stat.S_ISREG(status.st_mode)
             limit = byte_limit(MAX_FILE_BYTES if plain else MAX_UNPACKED_BYTES)
             if plain and status.st_size > limit:
                 raise refuse_size(path, limit)
-            begin = _begin_of_pipe(file, path, status)
+            begin = begin_of_pipe(file, path, status)
             content = file.read() if plain else begin + _at_most(file, limit + 1)
     except (OSError, ValueError, MemoryError) as error:
         if isinstance(error, (InvalidInputError, TooLargeError)):
@@ -189,7 +175,7 @@ def write_bytes_atomically(path: Path | str, content: bytes) -> None:
         if status is not None and stat.S_ISDIR(status.st_mode):
             raise _is_folder(path)
         if status is not None and not stat.S_ISREG(status.st_mode):
-            _write_in_place(path, content)
+            write_in_place(path, content)
             return
         _replace(Path(os.path.realpath(path)), content, status)
     except BrokenPipeError:
@@ -243,37 +229,10 @@ def cannot_read(path: Path | str, error: Exception, expected: str = "a file that
     return InvalidInputError(f"{path}: cannot be read: {reason}; expected {expected}")
 
 
-def _open_without_waiting(path: str, flags: int) -> int:
-    """Open a file, a named pipe even if no one writes to it yet."""
-    return os.open(path, flags | _NOT_WAITING)
-
-
-def _begin_of_pipe(file: IO[bytes], path: Path | str, status: os.stat_result) -> bytes:
-    """Return the first bytes of a pipe, nothing of other files, and let all that is read from now on be waited for.
-
-    Raises:
-        InvalidInputError: No one writes to the pipe within ``PIPE_WAIT`` seconds.
-    """
-    begin, end = b"", time.monotonic() + PIPE_WAIT
-    while stat.S_ISFIFO(status.st_mode) and not begin:
-        try:
-            begin = os.read(file.fileno(), _PART)
-        except BlockingIOError:
-            break  # someone has it open, and has not written yet
-        if not begin and time.monotonic() > end:
-            raise InvalidInputError(
-                f"{path}: a pipe to which no one writes for {PIPE_WAIT:g} s; expected a file, or a pipe with a writer"
-            )
-        time.sleep(0 if begin else _POLL)
-    if _NOT_WAITING:
-        os.set_blocking(file.fileno(), True)
-    return begin
-
-
 def _at_most(file: IO[bytes], n_bytes: int) -> bytes:
     """Return what a stream holds, but not more than so many bytes of it."""
     parts, left = [], n_bytes
-    while left and (part := file.read(min(left, _PART))):
+    while left and (part := file.read(min(left, PART))):
         parts.append(part)
         left -= len(part)
     return b"".join(parts)
@@ -305,41 +264,6 @@ def _write_to_descriptor(descriptor: int, content: bytes) -> None:
         if stream is not None:
             stream.flush()
     write_all(descriptor, content)
-
-
-def _write_in_place(path: Path | str, content: bytes) -> None:
-    """Write to a device or a named pipe.
-
-    Raises:
-        InvalidInputError: No one reads from the pipe within ``PIPE_WAIT`` seconds.
-    """
-    end = time.monotonic() + PIPE_WAIT
-    while True:
-        try:
-            descriptor = os.open(path, os.O_WRONLY | _NOT_WAITING)
-            break
-        except OSError as error:
-            if error.errno != errno.ENXIO or not stat.S_ISFIFO(os.stat(path).st_mode):
-                raise
-        if time.monotonic() > end:
-            raise InvalidInputError(
-                f"{path}: a pipe from which no one reads for {PIPE_WAIT:g} s; expected a file, or a pipe with a reader"
-            )
-        time.sleep(_POLL)
-    # A file object would write what is left once more when Ctrl-C ends it.
-    try:
-        if _NOT_WAITING:
-            os.set_blocking(descriptor, True)
-        write_all(descriptor, content)
-    finally:
-        os.close(descriptor)
-
-
-def write_all(descriptor: int, content: bytes) -> None:
-    """Write all of some bytes to an open descriptor."""
-    left = memoryview(content)
-    while left:
-        left = left[os.write(descriptor, left) :]
 
 
 def _replace(target: Path, content: bytes, status: os.stat_result | None) -> None:

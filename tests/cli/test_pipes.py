@@ -13,7 +13,7 @@ from contextlib import ExitStack
 
 import pytest
 
-from atg_fg.storage import plain_files
+from atg_fg.storage import named_pipes, plain_files
 from tests.cli.test_endings import begin, interrupted
 from tests.cli.test_paths import PATHS, arguments
 from tests.dask_cluster import wait_for
@@ -64,7 +64,7 @@ def test_a_command_gives_of_a_pipe_what_it_gives_of_a_file(run, tmp_path, comman
      "rescore {} --preset default", "trial --memory {}", "sim calibrate {} --output OUT"],
 )  # fmt: skip
 def test_a_pipe_to_which_no_one_writes_is_given_up(refused, tmp_path, monkeypatch, command):
-    monkeypatch.setattr(plain_files, "PIPE_WAIT", 0.1)
+    monkeypatch.setattr(named_pipes, "PIPE_WAIT", 0.1)
     os.mkfifo(tmp_path / "pipe")
     words = [word.format(tmp_path / "pipe").replace("OUT", str(tmp_path / "out")) for word in command.split()]
     assert "a pipe to which no one writes for 0.1 s; expected a file" in refused(*words)
@@ -72,7 +72,7 @@ def test_a_pipe_to_which_no_one_writes_is_given_up(refused, tmp_path, monkeypatc
 
 @pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="no named pipes")
 def test_one_who_writes_to_a_pipe_may_take_their_time(tmp_path, monkeypatch):
-    monkeypatch.setattr(plain_files, "PIPE_WAIT", 0.2)
+    monkeypatch.setattr(named_pipes, "PIPE_WAIT", 0.2)
     pipe = tmp_path / "pipe"
     os.mkfifo(pipe)
     content = os.urandom(3 * 2**20)
@@ -102,7 +102,7 @@ class TestPipeThatNoOneReads:
     @pytest.mark.slow
     @pytest.mark.parametrize(("words", "made"), MADE, ids=str)
     def test_each_output_of_each_command_is_given_up(self, tmp_path, monkeypatch, words, made):
-        monkeypatch.setattr(plain_files, "PIPE_WAIT", 0.1)
+        monkeypatch.setattr(named_pipes, "PIPE_WAIT", 0.1)
         pipe = commands.prepared(tmp_path / "work") / made
         os.mkfifo(pipe)
         begun = time.monotonic()
@@ -115,7 +115,7 @@ class TestPipeThatNoOneReads:
         assert not [path for path in pipe.parent.iterdir() if path.name.startswith(".")]
 
     def test_the_one_line_says_how_long_a_reader_was_waited_for(self, tmp_path, monkeypatch, refused):
-        monkeypatch.setattr(plain_files, "PIPE_WAIT", 0.1)
+        monkeypatch.setattr(named_pipes, "PIPE_WAIT", 0.1)
         os.mkfifo(tmp_path / "pipe")
         error = refused("memory", "example", tmp_path / "pipe")
         assert "pipe: a pipe from which no one reads for 0.1 s; expected a file, or a pipe with a reader" in error
@@ -149,7 +149,7 @@ class TestPipeThatNoOneReads:
     ("name", "path"), [(name, path.name) for name, paths in PATHS.items() for path in paths if not path.written]
 )
 def test_no_input_of_a_command_is_waited_for(tmp_path, monkeypatch, refused, name, path):
-    monkeypatch.setattr(plain_files, "PIPE_WAIT", 0.1)
+    monkeypatch.setattr(named_pipes, "PIPE_WAIT", 0.1)
     os.mkfifo(tmp_path / "pipe")
     begun = time.monotonic()
     refused(*arguments(name, **{path: tmp_path / "pipe"}))

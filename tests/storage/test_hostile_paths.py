@@ -7,7 +7,7 @@ import time
 import pytest
 
 from atg_fg.core.errors import AtgError
-from atg_fg.storage import plain_files
+from atg_fg.storage import named_pipes
 from tests.torture.originals import originals
 from tests.torture.reading import READERS, SUFFIXES
 
@@ -50,7 +50,7 @@ KINDS = [kind for kind in READERS if kind not in ("SQLite bag", "bag metadata")]
 @pytest.fixture
 def refusal(tmp_path, monkeypatch):
     """Read a path as a file of a kind; return the error, and check that it comes at once."""
-    monkeypatch.setattr(plain_files, "PIPE_WAIT", 0.1)
+    monkeypatch.setattr(named_pipes, "PIPE_WAIT", 0.1)
     monkeypatch.chdir(tmp_path)  # the names of sockets are short
 
     def of(kind, path):
