@@ -108,7 +108,8 @@ class TestPipeThatNoOneReads:
         begun = time.monotonic()
         status, error = commands.run(words, pipe.parent)
         assert time.monotonic() - begun < 60
-        assert (status, error.count("\n")) == (2, 1)
+        lines = [line for line in error.splitlines() if "compiling loops" not in line]
+        assert (status, len(lines)) == (2, 1)
         assert f"{pipe}: " in error
         assert "; expected " in error
         assert stat.S_ISFIFO(pipe.stat().st_mode)

@@ -15,7 +15,6 @@ import atexit
 import gc
 import json
 import os
-import resource
 import shutil
 import subprocess
 import sys
@@ -64,6 +63,7 @@ from atg_fg.storage.uai import read_evidence, read_model
 from sim.bodies.robot_mapping import read_mapping
 from sim.bodies.urdf_reader import read_urdf
 from sim.noise_calibration import calibrate, read_counts
+from tests.torture.address_space import limit_address_space, peak
 from tests.torture.mutations import FAST, mutated
 from tests.torture.originals import originals
 from tests.torture.recorded import BAG_TOPICS, bag_in_sqlite
@@ -71,8 +71,6 @@ from tests.torture.recorded import BAG_TOPICS, bag_in_sqlite
 #: What a file may take: seconds of processor time, and bytes beyond what the process had before.
 MAX_SECONDS = 1.0
 MAX_BYTES = 200 * 2**20
-#: A process has this much address space beyond what it begins with; beyond it there is a ``MemoryError``.
-_ADDRESS_SPACE = 2**30
 _HANGS = 20
 #: Entries of the tables for a UAI model; 8 bytes each.
 _LIMIT = 2**18
@@ -167,8 +165,8 @@ def warm_up(folder: Path) -> None:
 def measured(kind: str, content: bytes, folder: Path) -> dict[str, Any]:
     """Read a file as it may be read; return whether it could be, what went wrong, and what it took."""
     fault, read = None, False
-    _limit_address_space()
-    before = _peak(reset=True)
+    limit_address_space()
+    before = peak(reset=True)
     start = time.process_time()
     signal.setitimer(signal.ITIMER_PROF, _HANGS)
     try:
@@ -180,7 +178,7 @@ def measured(kind: str, content: bytes, folder: Path) -> dict[str, Any]:
     except BaseException as error:
         fault = f"{type(error).__name__}: {str(error)[:300]}"
     signal.setitimer(signal.ITIMER_PROF, 0)
-    seconds, taken = time.process_time() - start, _peak() - before
+    seconds, taken = time.process_time() - start, peak() - before
     if fault is None and seconds > MAX_SECONDS:
         fault = f"{seconds:.2f} s"
     if fault is None and taken > MAX_BYTES:
@@ -377,23 +375,6 @@ SUFFIXES: Final = {
     "MCAP bag": ".mcap",
     "bag of ROS 1": ".bag",
 }
-
-
-def _limit_address_space() -> None:
-    with open("/proc/self/statm") as file:
-        pages = int(file.read().split()[0])
-    most = pages * resource.getpagesize() + _ADDRESS_SPACE
-    resource.setrlimit(resource.RLIMIT_AS, (most, resource.RLIM_INFINITY))
-
-
-def _peak(*, reset: bool = False) -> int:
-    """Return the most RAM that this process had at once, since the last reset."""
-    if reset:
-        with open("/proc/self/clear_refs", "w") as file:
-            file.write("5")
-    with open("/proc/self/status") as file:
-        (line,) = (line for line in file if line.startswith("VmHWM"))
-    return int(line.split()[1]) * 1024
 
 
 def _say(entry: dict[str, Any]) -> None:
