@@ -196,7 +196,9 @@ def summarise(results: Iterable[TestResult]) -> dict[str, Any]:
         "standard_error": {name: standard_error(values) for name, values in rates.items()},
         "interval95": {name: list(pooled_interval(tests, name)) for name in rates},
         "between95": {
-            name: None if (interval := mean_interval(values)) is None else list(interval)
+            name: None
+            if (interval := mean_interval(values)) is None
+            else [max(interval[0], 0.0), min(interval[1], 1.0)]
             for name, values in rates.items()
         },
         "lost": sum(test.lost for test in tests),
