@@ -25,6 +25,7 @@ from atg_fg.experiments.scores import Score
 from atg_fg.learning.predictive_checks import summary_of_evidence, too_many_graphs
 from atg_fg.learning.structured_memory import StructuredMemory, memory_for
 from atg_fg.storage import plain_files
+from atg_fg.storage.database.memory_reading import database_holds_memory
 from atg_fg.storage.memory_files import goes_to_database, load_memory, open_memory, save_memory
 from atg_fg.storage.presets import preset as preset_named
 from atg_fg.storage.recording_oddities import oddities
@@ -91,10 +92,8 @@ def learn(
                     recorded_trials.teach(each, kept, advance)
                 else:
                     recorded_trials.learn(each, kept, chosen, parameters, advance)
-        if not kept.is_kept:
-            save_memory(kept, memory)
         document = {"command": "learn", **_learned(kept, memory, recordings)}
-    options.write_json(document, json_file)
+        _save(kept, memory, document, json_file)
     if json_file != "-":
         _tell_learned(document)
 
@@ -144,8 +143,6 @@ def recognise(
                 found += recorded_trials.recognise(
                     each, kept, chosen, parameters, learn=learns, scores=scores, on_trial=advance
                 )
-        if learns and not kept.is_kept:
-            save_memory(kept, memory)
         if is_known and not learns:
             made_from = recorded_trials.names_by_majority(found, made_from)
             scores, found = recorded_trials.scored_afterwards(found, made_from)
@@ -161,12 +158,19 @@ def recognise(
         }
         if write_page is not None and report is not None:
             write_page(found, kept, scored, report)
-    options.write_json(document, json_file)
+        _save(kept, memory if learns else None, document, json_file)
     if json_file != "-":
         options.print_tables([_table_of(document)])
         _tell_score(document)
         if report is not None:
             say(f"saved: {report}")
+
+
+def _save(memory: RobotMemory, path: Path | None, document: dict[str, Any], json_file: str | None) -> None:
+    """Write what a command found, then the memory: whoever repeats one that failed does not learn all once more."""
+    options.write_json(document, json_file)
+    if path is not None and not memory.is_kept:
+        save_memory(memory, path)
 
 
 def given_spec(
@@ -202,7 +206,8 @@ def _memory_for(
         plain_files.check_writable(path)
     is_there = os.path.exists(path) and not (plain_files.is_plain_file(path) and path.stat().st_size == 0)
     if keeps and goes_to_database(path):
-        held = open_memory(path) if is_there else open_memory(path, _extended(recordings[0].assumptions(), recordings))
+        begun = is_there and database_holds_memory(path)
+        held = open_memory(path) if begun else open_memory(path, _extended(recordings[0].assumptions(), recordings))
     elif is_there:
         held = load_memory(path)
     else:

@@ -1,12 +1,15 @@
 """Recordings of a user's own on the command line: looked at, learned from, recognised, shown."""
 
 import json
+import sqlite3
 import sys
+from contextlib import closing
 from itertools import pairwise
 
 import numpy as np
 import pytest
 
+from atg_fg.storage.database.connection import open_to_write
 from atg_fg.storage.memory_files import load_memory
 
 LABELS = ("logo", "text", "barcode", "lid", "base", "seal", "plain", "window")
@@ -67,6 +70,16 @@ def test_what_was_learned_unsupervised_recognises_what_comes_next(run, folder):
     told = run("memory", "structure", "robot.db")[1].splitlines()
     assert told[0] == "robot.db: no learned structure: looks err, see below"
     assert told[1].startswith("looks err: ")
+
+
+@pytest.mark.parametrize("left", ["", "CREATE TABLE t (x); DROP TABLE t", None], ids=("nothing", "no table", "no rows"))
+def test_what_a_writer_that_had_no_room_left_is_a_new_memory(run, folder, left):
+    if left is None:
+        open_to_write("robot.db", create=True).close()
+    else:
+        with closing(sqlite3.connect("robot.db")) as connection:
+            connection.executescript(left)
+    assert document(run, "learn", "second.csv", "--memory", "robot.db", "--objects", "3")["trials"] == 8
 
 
 def test_an_empty_memory_is_begun_and_each_trial_learned_before_the_next(run, folder):

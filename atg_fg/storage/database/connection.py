@@ -32,6 +32,10 @@ _WRITING_FAILED: Final = (
 )
 
 
+class EmptyDatabaseError(InvalidInputError):
+    """A database without a table: a writer made it, and came no further."""
+
+
 def is_database(path: Path | str) -> bool:
     """Return whether there is an SQLite file at ``path``, whatever its name says."""
     return starts_with(path, _MAGIC)
@@ -103,7 +107,7 @@ def open_to_read(path: Path | str) -> sqlite3.Connection:
                 connection = _connected(path, "mode=ro&immutable=1")
                 version = schema.version_of(connection, str(path))
             if version == 0:
-                raise InvalidInputError(f"{path}: an empty database; expected a memory")
+                raise EmptyDatabaseError(f"{path}: an empty database; expected a memory")
             if version < len(schema.MIGRATIONS):
                 connection = _migrated_copy(connection, path)
         except BaseException:

@@ -10,7 +10,7 @@ from atg_fg.core.checks import plain_text, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.storage.checked_json import parse_json, read_object
-from atg_fg.storage.database.connection import reading
+from atg_fg.storage.database.connection import EmptyDatabaseError, reading
 from atg_fg.storage.memory_json import MEMORY_FORMAT, memory_from_document
 
 
@@ -42,13 +42,16 @@ def read_memory_rows(connection: sqlite3.Connection, place: str) -> RobotMemory:
 
 
 def database_holds_memory(path: Path | str) -> bool:
-    """Return whether a database has a memory.
+    """Return whether a database has a memory; an empty one has none.
 
     Raises:
         InvalidInputError: It cannot be read.
     """
-    with reading(path) as connection:
-        return holds_memory(connection)
+    try:
+        with reading(path) as connection:
+            return holds_memory(connection)
+    except EmptyDatabaseError:
+        return False
 
 
 def holds_memory(connection: sqlite3.Connection) -> bool:
