@@ -216,11 +216,11 @@ def actions_a_trial(results: Iterable[TestResult]) -> dict[str, Any]:
 
 
 def _mended(tests: Sequence[TestResult]) -> dict[str, Any]:
-    """Return how many verdicts are right as they were mended, in tests that mended any."""
-    counts = [test.mended for test in tests if test.mended is not None]
-    if not counts:
+    """Return how many verdicts are right as they were mended, where any was; in a test without they are as given."""
+    if all(test.mended is None for test in tests):
         return {}
-    right, total = (sum(each) for each in zip(*counts, strict=True))
+    counts = [test.success if test.mended is None else test.mended for test in tests]
+    right, total = (sum(column) for column in zip(*counts, strict=True))
     return {"mended": {"right": right, "trials": total, "interval95": list(wilson_interval(right, total))}}
 
 
