@@ -11,6 +11,7 @@ exactly.
 from __future__ import annotations
 
 import copy
+from types import ModuleType
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -106,9 +107,6 @@ class PoseFilter:
         alphabet: PatternAlphabet,
         log_weights: FloatArray | None = None,
     ) -> None:
-        from atg_fg.learning import pose_kernels  # they load Numba
-
-        self._kernels = pose_kernels
         self._poses, self._rates, self._alphabet = poses, rates, alphabet
         self.log_weights = log_weights
         n_owners, n_poses = len(contents), len(poses.registers)
@@ -250,6 +248,12 @@ class PoseFilter:
         events = np.zeros((len(self.log_evidence), 4))
         np.add.at(events, self.rows.owner, self.rows.weight[:, None] * self.rows.events)
         return events
+
+    @property
+    def _kernels(self) -> ModuleType:
+        from atg_fg.learning import pose_kernels  # they load Numba; as an attribute they could not be pickled
+
+        return pose_kernels
 
     def _in_view(self, rows: Rows) -> IntArray:
         """Return the register in each of the J slots, shape [R, J]."""

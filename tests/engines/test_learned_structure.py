@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import copy
 import math
+import pickle
 from dataclasses import replace
 from fractions import Fraction
 
@@ -210,6 +212,16 @@ def test_probabilities_sum_to_one_and_asking_changes_nothing(cube_memory):
             assert marginal.sum() == pytest.approx(1, abs=1e-9)
     np.testing.assert_array_equal(inference.identity().objects, before.objects)
     np.testing.assert_array_equal(inference.expected_entropies(), entropies)
+
+
+@pytest.mark.parametrize("copied", [copy.copy, copy.deepcopy, lambda inference: pickle.loads(pickle.dumps(inference))])
+def test_a_copy_of_what_follows_a_structure_goes_on_by_itself(cube_memory, copied):
+    inference, untouched = (played(cube_memory, cubes(8)[3], 3) for _ in range(2))
+    other = copied(inference)
+    assert other.identity().unseen == untouched.identity().unseen
+    other.act(0)
+    other.observe(Evidence.of_detection(ARCUBES.alphabet, (0, 1)))
+    np.testing.assert_array_equal(inference.identity().objects, untouched.identity().objects)
 
 
 def test_aspects_are_known_by_their_poses(cube_memory):
