@@ -9,7 +9,6 @@ import pytest
 from atg_fg.core.errors import InvalidInputError, UnknownNameError
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import PatternAlphabet
-from atg_fg.core.statistics import Z_95
 from atg_fg.experiments.figure3 import figure3_points
 from atg_fg.experiments.scores import TestResult, actions_a_trial, summarise
 from atg_fg.experiments.table1 import TestPlan, run_test, run_tests
@@ -256,8 +255,9 @@ class TestSettled:
         results = [TestResult(seed, (0, 2), (0, 0), (0, 2), actions=(seed, 4)) for seed in (0, 2)]
         number = actions_a_trial(results)
         assert number["mean"] == 2.5
-        # s² = 11/3 over 4 trials
-        assert number["interval95"] == pytest.approx([2.5 - Z_95 * (11 / 12) ** 0.5, 2.5 + Z_95 * (11 / 12) ** 0.5])
+        # s² = 11/3 over 4 trials; Student's 95 % point with 3 degrees of freedom is 3.182446.
+        margin = 3.182446 * (11 / 12) ** 0.5
+        assert number["interval95"] == pytest.approx([2.5 - margin, 2.5 + margin])
         assert actions_a_trial([TestResult(0, (0, 1), (0, 0), (0, 1), actions=(3,))])["interval95"] is None
 
     @pytest.mark.parametrize("settled", [0.0, float("nan")])
