@@ -30,7 +30,6 @@ from atg_fg.core.records import TrialSummary
 from atg_fg.display.figures import PALETTE, figure_class, plot_style
 from atg_fg.display.structure_picture import draw_structure
 from atg_fg.experiments.scores import Score
-from atg_fg.experiments.table1 import TestPlan, run_test
 from atg_fg.experiments.trial import learn_from, run_trial
 from atg_fg.learning.completion import completed_atg
 from atg_fg.learning.likelihood import score_trials
@@ -38,7 +37,6 @@ from atg_fg.learning.object_kinds import kinds_of
 from atg_fg.learning.rates import Rates
 from atg_fg.learning.raw_trials import RawTrial
 from atg_fg.learning.structured_memory import memory_for
-from atg_fg.policies.goal import GoalPolicy
 
 learned, entropy = atg.preset("learned"), atg.make_policy("entropy")
 world = atg.make_world("mixed", n_objects=100, objects_seed=0)
@@ -203,7 +201,7 @@ print(f"{name}: {memory[name].n_known} aspects seen, {len(predicted[name])} more
 
 # %%
 place = next(number for number, known in met.items() if known == name)
-policy = GoalPolicy(goal)
+policy = atg.GoalPolicy(goal)
 inference = atg.begin_trial("learned-structure", memory, learned)
 record = run_trial(world, inference, policy, 20, np.random.default_rng(3), reset_options={"object": place})
 for step in record.steps:
@@ -223,6 +221,6 @@ atg.plot_belief(record)
 # some nine aspects of 24, which is often too little to overlap with what is remembered:
 
 # %%
-plan = TestPlan(world="random-atg", engine="learned-structure", parameters=learned, n_trials=100)
-result = run_test(plan, 100)
+plan = atg.TestPlan(world="random-atg", engine="learned-structure", parameters=learned, n_trials=100)
+result = atg.run_test(plan, 100)
 print(f"random graphs: {result.success[0]} of {result.success[1]} trials succeed")

@@ -76,7 +76,7 @@ def test_a_table_on_the_robot_is_recorded_and_gone_on_with(run, refused, tmp_pat
     status, again, _ = run(*arguments, "--trials", 2, "--resume")
     assert (status, again) == (0, whole)
     assert "--resume: no records" in refused("table1", "--resume")
-    assert "cannot be made" in refused("table1", "--condition", "worn", "--jobs", 1)
+    assert "option 'condition': unknown" in refused("table1", "--condition", "worn", "--jobs", 1)
 
 
 COUNTS = {

@@ -51,5 +51,5 @@ def test_worlds_of_tags_are_recorded_too():
     assert recording.slots == ("front", "top")
     assert recording.exclusive
     assert recording.trials[0].looks[0].labels[0] in recording.labels
-    with pytest.raises(InvalidInputError, match="cannot be made"):
+    with pytest.raises(InvalidInputError, match="option 'no_such_option': unknown"):
         simulated_recording("ideal", 3, 2, 4, seed=0, no_such_option=1)
