@@ -221,7 +221,7 @@ def test_the_guide_says_what_is_known_of_a_weight(tmp_path):
 
     senses, _ = blocks("your_data.md", "json")
     (tmp_path / "spec.json").write_text(senses)
-    (rows,) = blocks("your_data.md", "csv")
+    (rows,) = blocks("your_data.md", "text")
     (tmp_path / "looks.csv").write_text(rows)
     recording = read_recording(tmp_path / "looks.csv", read_spec(tmp_path / "spec.json"))
     (weight,) = recording.senses
