@@ -8,7 +8,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 
 from atg_fg.core.patterns import FloatArray
-from atg_fg.inference.kernels.compilation import compiled
+from atg_fg.inference.kernels.compilation import compiled_if_installed
 
 Vector: TypeAlias = FloatArray | tuple[float, float, float]
 
@@ -31,8 +31,17 @@ class Arms(NamedTuple):
     pads: FloatArray
 
 
-class Hands(NamedTuple):
-    """Where hands are, as ``HandPoses`` tells."""
+class HandPoses(NamedTuple):
+    """Both hands at some joint angles; the first axis of each array is the side, left before right.
+
+    Attributes:
+        pad: Middle of the pad on the knuckles in the robot's frame, shape [2, 3], m.
+        axis: Unit vector out of the hand, to the face that it presses, shape [2, 3].
+        palm: Unit vector normal to the palm, shape [2, 3].
+        rotation: From the hand's frame at joint angle zero to its frame now, shape [2, 3, 3].
+        jacobian: How pad (first three rows, m/rad) and orientation (last three) move with the joints, shape [2, 6, 7].
+        joints: Position of each joint, shape [2, 7, 3], m.
+    """
 
     pad: FloatArray
     axis: FloatArray
@@ -42,8 +51,8 @@ class Hands(NamedTuple):
     joints: FloatArray
 
 
-@compiled
-def hands_at(arms: Arms, angles: FloatArray) -> Hands:
+@compiled_if_installed
+def hands_at(arms: Arms, angles: FloatArray) -> HandPoses:
     """Return where the hands are at joint angles of shape [arms, joints], rad: each joint turns all that follows."""
     n_arms, n_joints = angles.shape
     joints, jacobian = np.empty((n_arms, n_joints, 3)), np.empty((n_arms, 6, n_joints))
@@ -74,16 +83,16 @@ def hands_at(arms: Arms, angles: FloatArray) -> Hands:
             moves = crossed(jacobian[arm, 3:, joint], lever)
             for row in range(3):
                 jacobian[arm, row, joint] = moves[row]
-    return Hands(pad, axis, palm, rotation, jacobian, joints)
+    return HandPoses(pad, axis, palm, rotation, jacobian, joints)
 
 
-@compiled
+@compiled_if_installed
 def dot(a: Vector, b: Vector) -> float:
     """Return the scalar product of two vectors with three elements."""
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
-@compiled
+@compiled_if_installed
 def crossed(a: Vector, b: Vector) -> tuple[float, float, float]:
     """Return the cross product of two vectors with three elements."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]

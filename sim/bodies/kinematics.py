@@ -2,37 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
 
 from atg_fg.core.patterns import FloatArray
-from sim.bodies.arm_kernels import Arms, hands_at
+from sim.bodies.arm_kernels import Arms, HandPoses, hands_at
 
 #: Takes all products of two vectors' elements to their cross product.
 _CROSS: Final = np.cross(np.eye(3)[:, None], np.eye(3)[None]).reshape(9, 3)
-
-
-@dataclass(frozen=True, eq=False)
-class HandPoses:
-    """Both hands at some joint angles; the first axis of each array is the side, left before right.
-
-    Attributes:
-        pad: Middle of the pad on the knuckles in the robot's frame, shape [2, 3], m.
-        axis: Unit vector out of the hand, to the face that it presses, shape [2, 3].
-        palm: Unit vector normal to the palm, shape [2, 3].
-        rotation: From the hand's frame at joint angle zero to its frame now, shape [2, 3, 3].
-        jacobian: How pad (first three rows, m/rad) and orientation (last three) move with the joints, shape [2, 6, 7].
-        joints: Position of each joint, shape [2, 7, 3], m.
-    """
-
-    pad: FloatArray
-    axis: FloatArray
-    palm: FloatArray
-    rotation: FloatArray
-    jacobian: FloatArray
-    joints: FloatArray
 
 
 class ArmKinematics:
@@ -82,7 +60,8 @@ class ArmKinematics:
 
     def hands(self, angles: FloatArray) -> HandPoses:
         """Return the poses of both hands at joint angles of shape [2, 7] (rad)."""
-        return HandPoses(*hands_at(self.arms, np.ascontiguousarray(angles, float)))
+        hands: HandPoses = hands_at(self.arms, np.ascontiguousarray(angles, float))
+        return hands
 
 
 def cross(a: FloatArray, b: FloatArray) -> FloatArray:

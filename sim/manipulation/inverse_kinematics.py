@@ -13,9 +13,9 @@ from typing import Final, NamedTuple
 import numpy as np
 
 from atg_fg.core.patterns import FloatArray
-from atg_fg.inference.kernels.compilation import compiled
-from sim.bodies.arm_kernels import Arms, Hands, crossed, dot, hands_at
-from sim.bodies.kinematics import ArmKinematics, HandPoses
+from atg_fg.inference.kernels.compilation import compiled_if_installed
+from sim.bodies.arm_kernels import Arms, HandPoses, crossed, dot, hands_at
+from sim.bodies.kinematics import ArmKinematics
 
 #: Metres that a radian of orientation counts for.
 _ORIENTATION_WEIGHT: Final = 0.25
@@ -121,11 +121,11 @@ def solve(kinematics: ArmKinematics, task: HandTask, start: FloatArray, rest: Fl
     lean, _, spin = _missed(hands, wanted)
     miss = task.pad - hands.pad
     outside = np.maximum(0.0, lean - task.cone)
-    return Solution(angles, np.sqrt(np.vecdot(miss, miss)), outside, np.abs(spin), HandPoses(*hands))
+    return Solution(angles, np.sqrt(np.vecdot(miss, miss)), outside, np.abs(spin), hands)
 
 
-@compiled
-def _missed(hands: Hands, task: _Task) -> tuple[FloatArray, FloatArray, FloatArray]:
+@compiled_if_installed
+def _missed(hands: HandPoses, task: _Task) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Return by what hands miss a task.
 
     They are the angle from each hand's axis to the normal, shape [arms], rad; the unit vector to turn about against it,
@@ -147,10 +147,10 @@ def _missed(hands: Hands, task: _Task) -> tuple[FloatArray, FloatArray, FloatArr
     return lean, direction, spin
 
 
-@compiled
+@compiled_if_installed
 def _solved(
     arms: Arms, lower: FloatArray, upper: FloatArray, task: _Task, start: FloatArray, rest: FloatArray
-) -> tuple[FloatArray, Hands]:
+) -> tuple[FloatArray, HandPoses]:
     """Return joint angles near ``start`` that do a task, and where the hands are then.
 
     All arms stop together.
@@ -175,8 +175,8 @@ def _solved(
     return angles, hands
 
 
-@compiled
-def _set_residual(hands: Hands, task: _Task, error: FloatArray, jacobian: FloatArray) -> None:
+@compiled_if_installed
+def _set_residual(hands: HandPoses, task: _Task, error: FloatArray, jacobian: FloatArray) -> None:
     """Set what is still to be done, shape [arms, rows], and how the joints do it, shape [arms, rows, joints]."""
     lean, direction, spin = _missed(hands, task)
     for arm in range(len(error)):
@@ -196,7 +196,7 @@ def _set_residual(hands: Hands, task: _Task, error: FloatArray, jacobian: FloatA
                 jacobian[arm, 6, joint] = _ORIENTATION_WEIGHT * dot(task.normal[arm], hands.jacobian[arm, 3:, joint])
 
 
-@compiled
+@compiled_if_installed
 def _take_step(
     jacobian: FloatArray, error: FloatArray, angles: FloatArray, rest: FloatArray, lower: FloatArray, upper: FloatArray
 ) -> None:
@@ -205,7 +205,8 @@ def _take_step(
     square, weights, pull = np.empty((n_rows, n_rows)), error.copy(), np.empty(n_joints)
     for joint in range(n_joints):
         pull[joint] = _REST_GAIN * (rest[joint] - angles[joint])
-    # Cholesky's factor of the damped square, a row after the other, and the right side with it.
+    # Cholesky's factor of the damped square, a row after the other, and the right side with it: Numba's own solver
+    # would need SciPy.
     for row in range(n_rows):
         for joint in range(n_joints):
             weights[row] -= jacobian[row, joint] * pull[joint]

@@ -44,6 +44,11 @@ def compiled(function: _Function) -> _Function:
     return result
 
 
+def compiled_if_installed(function: _Function) -> _Function:
+    """Have Numba compile a function as ``compiled`` does; without Numba Python runs the same loop, slowly."""
+    return compiled(function) if _is_installed() else function
+
+
 def reordered(function: _Function) -> _Function:
     """Have Numba compile a function as ``compiled`` does, and let it change the order in which numbers are added up.
 
