@@ -188,8 +188,7 @@ def _table1(title: str, results: Iterable[TestResult], summary: dict[str, Any], 
 
 
 def _share_interval(interval: Sequence[float]) -> str:
-    """Return an interval of a rate; one that a mean has by its spread may lead out of 0 to 1, where no rate is."""
-    low, high = (min(max(bound, 0.0), 1.0) for bound in interval)
+    low, high = interval
     return f"{100 * low:.1f}-{100 * high:.1f}%"
 
 

@@ -35,7 +35,7 @@ from atg_fg.core.version import __version__
 from atg_fg.learning.structured_memory import memory_for
 from atg_fg.policies import make_policy
 from atg_fg.storage import plain_files
-from atg_fg.storage.memory_files import goes_to_database, load_memory, open_memory, save_trial
+from atg_fg.storage.memory_files import goes_to_database, has_memory, load_memory, open_memory, save_trial
 from atg_fg.storage.presets import preset as preset_named
 from atg_fg.worlds.arcube import ACTION_ROTATIONS, ORIENTATIONS
 
@@ -182,7 +182,7 @@ def _memory(path: Path | None, tags: CubeTags, n_objects: int | None) -> RobotMe
     if path is None:
         return RobotMemory(assumptions)
     if goes_to_database(path):
-        return open_memory(path) if os.path.exists(path) and path.stat().st_size else open_memory(path, assumptions)
+        return open_memory(path) if has_memory(path) else open_memory(path, assumptions)
     plain_files.check_writable(path)
     return load_memory(path) if os.path.exists(path) else RobotMemory(assumptions)
 

@@ -19,10 +19,9 @@ from atg_fg.storage.checked_json import parse_json
 from atg_fg.storage.compact_file import is_compact
 from atg_fg.storage.database.checking import faults_of_database
 from atg_fg.storage.database.connection import is_database
-from atg_fg.storage.database.memory_reading import database_holds_memory
 from atg_fg.storage.database.repairing import repair_database
 from atg_fg.storage.database.trial_log import read_stored_experiments, read_stored_trials
-from atg_fg.storage.memory_files import load_memory
+from atg_fg.storage.memory_files import is_database_without_memory, load_memory
 from atg_fg.storage.memory_json import MEMORY_FORMAT, memory_from_document, memory_from_json
 from atg_fg.storage.packaged import example_memory
 
@@ -49,7 +48,7 @@ def show(file: options.MemoryFile, json_file: options.JsonFile = None) -> None:
     """
     options.check_json_option(json_file)
     records = _records(file) if is_database(file) else {}
-    memory = load_memory(file) if _holds_memory(file) else None
+    memory = None if is_database_without_memory(file) else load_memory(file)
     document: dict[str, Any] = {"command": "memory show"}
     if memory is not None:
         assumptions = memory.assumptions
@@ -123,7 +122,7 @@ def check(file: options.MemoryFile, json_file: options.JsonFile = None) -> int:
 
 def _check(file: Path, json_file: str | None) -> int:
     faults = faults_of_database(file) if is_database(file) else _faults_of_json(file)
-    memory = None if faults or not _holds_memory(file) else load_memory(file)
+    memory = None if faults or is_database_without_memory(file) else load_memory(file)
     sound: dict[str, Any] = {"sound": not faults}
     if faults:
         sound["faults"] = faults
@@ -152,10 +151,6 @@ def repair(
     if json_file != "-":
         for line in faults or [f"{file}: no record in it is bad"]:
             say(line)
-
-
-def _holds_memory(file: Path) -> bool:
-    return not is_database(file) or database_holds_memory(file)
 
 
 def _faults_of_json(file: Path) -> list[str]:

@@ -21,7 +21,7 @@ from atg_fg.learning.structured_memory import StructuredMemory
 from atg_fg.storage import memory_files, memory_json, plain_files
 from atg_fg.storage.database.connection import is_database, writing
 from atg_fg.storage.database.copying import add_records, records_in, records_in_log
-from atg_fg.storage.database.memory_reading import database_holds_memory, holds_memory, read_memory_rows
+from atg_fg.storage.database.memory_reading import holds_memory, read_memory_rows
 from atg_fg.storage.database.memory_writing import replace_memory
 from atg_fg.storage.database.trial_log import read_stored_trials
 from atg_fg.storage.graph_export import view_to_dot, view_to_graphml
@@ -116,7 +116,9 @@ def _import(files: list[Path], into: Path) -> None:
     logs = [file for file in files if plain_files.starts_with(file, plain_files.GZIP)]
     records: list[list[tuple[Experiment | None, list[TrialSummary]]]] = [[records_in_log(file)] for file in logs]
     records += [list(records_in(file)) for file in files if is_database(file)]
-    memories = [load_memory(file) for file in files if file not in logs and _has_memory(file)]
+    memories = [
+        load_memory(file) for file in files if file not in logs and not memory_files.is_database_without_memory(file)
+    ]
     full = [memory for memory in memories if len(memory)] or memories[:1]
     with writing(into, create=True) as connection:
         there = read_memory_rows(connection, str(into)) if holds_memory(connection) else None
@@ -128,10 +130,6 @@ def _import(files: list[Path], into: Path) -> None:
     n_objects = sum(map(len, full))
     n_experiments, n_trials = (sum(counts[kind] for counts in added) for kind in (0, 1))
     say(f"{into}: {n_objects} ATGs, {n_experiments} experiments and {n_trials} trials imported")
-
-
-def _has_memory(file: Path) -> bool:
-    return not is_database(file) or database_holds_memory(file)
 
 
 def merge(

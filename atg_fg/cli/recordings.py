@@ -25,8 +25,7 @@ from atg_fg.experiments.scores import Score
 from atg_fg.learning.predictive_checks import summary_of_evidence, too_many_graphs
 from atg_fg.learning.structured_memory import StructuredMemory, memory_for
 from atg_fg.storage import plain_files
-from atg_fg.storage.database.memory_reading import database_holds_memory
-from atg_fg.storage.memory_files import goes_to_database, load_memory, open_memory, save_memory
+from atg_fg.storage.memory_files import goes_to_database, has_memory, load_memory, open_memory, save_memory
 from atg_fg.storage.presets import preset as preset_named
 from atg_fg.storage.recording_oddities import oddities
 from atg_fg.storage.recordings import (
@@ -204,14 +203,13 @@ def _memory_for(
     """
     if keeps:
         plain_files.check_writable(path)
-    is_there = os.path.exists(path) and not (plain_files.is_plain_file(path) and path.stat().st_size == 0)
-    if keeps and goes_to_database(path):
-        begun = is_there and database_holds_memory(path)
-        held = open_memory(path) if begun else open_memory(path, _extended(recordings[0].assumptions(), recordings))
-    elif is_there:
+    if not keeps or (has_memory(path) and not goes_to_database(path)):
         held = load_memory(path)
+    elif has_memory(path):
+        held = open_memory(path)
     else:
-        held = RobotMemory(_extended(recordings[0].assumptions(), recordings))
+        assumptions = _extended(recordings[0].assumptions(), recordings)
+        held = open_memory(path, assumptions) if goes_to_database(path) else RobotMemory(assumptions)
     held.extend(_extended(held.assumptions, recordings).alphabet.names)
     return memory_for(parameters, held)
 

@@ -195,17 +195,18 @@ def summarise(results: Iterable[TestResult]) -> dict[str, Any]:
         "average": {name: mean(values) for name, values in rates.items()},
         "standard_error": {name: standard_error(values) for name, values in rates.items()},
         "interval95": {name: list(pooled_interval(tests, name)) for name in rates},
-        "between95": {
-            name: None
-            if (interval := mean_interval(values)) is None
-            else [max(interval[0], 0.0), min(interval[1], 1.0)]
-            for name, values in rates.items()
-        },
+        "between95": {name: _interval_between(values) for name, values in rates.items()},
         "lost": sum(test.lost for test in tests),
         "undecided": sum(test.undecided for test in tests),
         **_merges_of(tests),
         **_mended(tests),
     }
+
+
+def _interval_between(rates: Sequence[float]) -> list[float] | None:
+    """Return Student's 95 % interval of the mean rate of tests, within 0 to 1, ``None`` for fewer than two tests."""
+    interval = mean_interval(rates)
+    return None if interval is None else [max(interval[0], 0.0), min(interval[1], 1.0)]
 
 
 def actions_a_trial(results: Iterable[TestResult]) -> dict[str, Any]:

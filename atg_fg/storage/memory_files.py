@@ -15,7 +15,7 @@ from atg_fg.learning.structured_memory import StructuredMemory
 from atg_fg.storage.compact_file import is_compact, load_compact_memory, save_compact_memory
 from atg_fg.storage.database.connection import WAIT, is_database, open_to_read, open_to_write, translated, written
 from atg_fg.storage.database.keeper import DatabaseKeeper
-from atg_fg.storage.database.memory_reading import holds_memory, load_database, read_memory_rows
+from atg_fg.storage.database.memory_reading import database_holds_memory, holds_memory, load_database, read_memory_rows
 from atg_fg.storage.database.memory_writing import replace_memory
 from atg_fg.storage.database.saving import save_database
 from atg_fg.storage.memory_json import memory_from_json, memory_to_json
@@ -117,7 +117,22 @@ def open_memory(
 
 def goes_to_database(path: Path | str) -> bool:
     """Return whether a memory is saved to ``path`` as a database: by what is there, or else by the name."""
-    there = Path(path)
-    if os.path.exists(there) and not (is_plain_file(path) and there.stat().st_size == 0):
-        return is_database(path)
-    return there.suffix in DATABASE_SUFFIXES
+    return is_database(path) if _is_there(path) else Path(path).suffix in DATABASE_SUFFIXES
+
+
+def has_memory(path: Path | str) -> bool:
+    """Return whether what is at ``path`` is to be read as a memory; else a new one can be begun there."""
+    return _is_there(path) and not is_database_without_memory(path)
+
+
+def is_database_without_memory(path: Path | str) -> bool:
+    """Return whether a file is a database that holds records of trials alone, or nothing yet.
+
+    Raises:
+        InvalidInputError: It is a database that cannot be read.
+    """
+    return is_database(path) and not database_holds_memory(path)
+
+
+def _is_there(path: Path | str) -> bool:
+    return os.path.exists(path) and not (is_plain_file(path) and os.path.getsize(path) == 0)
