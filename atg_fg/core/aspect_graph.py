@@ -276,8 +276,6 @@ class AspectTransitionGraph:
             other._measured,
         )
 
-    __hash__ = None  # type: ignore[assignment]  # mypy's usual complaint; graphs grow, so they are no keys
-
     def table(self) -> Table:
         """Return the known aspects, and where each action was seen to lead."""
         assumptions, aspects = self.assumptions, self.aspects

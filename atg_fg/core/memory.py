@@ -355,8 +355,6 @@ class RobotMemory(Persistent):
         ours, theirs = ((each.assumptions, list(each), each.merges, each.sense) for each in (self, other))
         return ours == theirs
 
-    __hash__ = None  # type: ignore[assignment]
-
     def table(self) -> Table:
         """Return the remembered objects, the first ones of many."""
         assumptions = self.assumptions

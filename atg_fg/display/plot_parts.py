@@ -50,7 +50,9 @@ def label_ends(axes: Axes, ends: Sequence[LineEnd]) -> None:
     """Write each line's name to the right of the plot at the height of its end, moved apart where needed."""
     low, high = axes.get_ylim()
     # About 80 % of the figure's height are plot; a line of text takes 13 points of it.
-    gap = 13 / (0.8 * 72 * axes.get_figure(root=True).get_figheight()) * (high - low)  # type: ignore[union-attr]
+    figure = axes.get_figure(root=True)
+    assert figure is not None
+    gap = 13 / (0.8 * 72 * figure.get_figheight()) * (high - low)
     for end, y in zip(ends, _apart(np.array([end.y for end in ends]), gap, low, high), strict=True):
         italic, bold = "italic" in end.look, "bold" in end.look
         axes.annotate(

@@ -368,8 +368,6 @@ class StructuredMemory(RobotMemory):
         saved = self.evidence.saved()
         return self.reassignments, None if saved is None else (saved.chains, saved.weights, saved.n_trials)
 
-    __hash__ = None
-
     def _more_to_say(self) -> str:
         believed = self.learner.believed(self.names)
         weights = f"with weights {', '.join(f'{each.weight:.2f}' for each in believed)}" if believed else "none"

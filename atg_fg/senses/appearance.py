@@ -168,8 +168,6 @@ class AppearanceSense:
         )
         return ours == theirs
 
-    __hash__ = None  # type: ignore[assignment]
-
     def __repr__(self) -> str:
         return f"AppearanceSense({self.codebook.n_classes} classes of {self.features!r}, {len(self.trials)} trials)"
 

@@ -136,8 +136,6 @@ class FeatureSpace:
         arrays = zip(self._arrays(), other._arrays(), strict=True)
         return self.features == other.features and all(np.array_equal(ours, theirs) for ours, theirs in arrays)
 
-    __hash__ = None  # type: ignore[assignment]
-
     def _arrays(self) -> tuple[FloatArray, ...]:
         return self.mean, self.projection, self.between
 

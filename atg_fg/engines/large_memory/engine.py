@@ -331,5 +331,8 @@ def _next_looks(rows: Rows, weights: FloatArray, *, exact: bool) -> NextLooks:
     """Return the next looks of objects one by one; compiled loops follow all edges as quickly as a few."""
     if isinstance(rows, AspectFilter):
         return one_by_one(rows, weights, exact=exact)
-    predictive, terms = rows.next_looks(weights)  # type: ignore[attr-defined]
+    from atg_fg.engines.large_memory.matched_rows import MatchedRows  # it loads Numba
+
+    assert isinstance(rows, MatchedRows)
+    predictive, terms = rows.next_looks(weights)
     return NextLooks(predictive, terms, 0.0)
