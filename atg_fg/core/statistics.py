@@ -48,23 +48,23 @@ def mean_interval(values: Sequence[float]) -> tuple[float, float] | None:
     return centre - margin, centre + margin
 
 
-def student_95(freedom: int) -> float:
+def student_95(degrees_of_freedom: int) -> float:
     """Return the two-sided 95 % point of Student's t distribution, by halving: its share within ±t is a finite sum."""
-    if freedom > _NORMAL:
+    if degrees_of_freedom > _NORMAL:
         return Z_95
     low, high = Z_95, 13.0
     while high - low > 1e-12 * high:
         middle = (low + high) / 2
-        low, high = (middle, high) if _within(middle, freedom) < 0.95 else (low, middle)
+        low, high = (middle, high) if _within(middle, degrees_of_freedom) < 0.95 else (low, middle)
     return high
 
 
-def _within(t: float, freedom: int) -> float:
+def _within(t: float, degrees_of_freedom: int) -> float:
     """Return the share of Student's t distribution within ±t (Abramowitz & Stegun 26.7.3 and 26.7.4)."""
-    angle, is_odd = math.atan(t / math.sqrt(freedom)), freedom % 2
+    angle, is_odd = math.atan(t / math.sqrt(degrees_of_freedom)), degrees_of_freedom % 2
     term = math.cos(angle) if is_odd else 1.0
     total = 0.0
-    for number in range(is_odd, freedom - 1, 2):
+    for number in range(is_odd, degrees_of_freedom - 1, 2):
         total += term
         term *= (number + 1) / (number + 2) * math.cos(angle) ** 2
     return 2 / math.pi * (angle + math.sin(angle) * total) if is_odd else math.sin(angle) * total

@@ -96,18 +96,11 @@ def check(kind, content, folder):
     assert took < 4 + size / 1e6
 
 
+@pytest.mark.parametrize("depth", [1, pytest.param(3, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("kind", KINDS)
-def test_odd_values_are_read_or_refused_in_one_line(kind, tmp_path):
+def test_odd_values_are_read_or_refused_in_one_line(kind, depth, tmp_path):
     for what in ODD.values():
-        for content in files(kind, what, 1):
-            check(kind, content, tmp_path)
-
-
-@pytest.mark.slow
-@pytest.mark.parametrize("kind", KINDS)
-def test_odd_values_deeper_down_are_read_or_refused_in_one_line(kind, tmp_path):
-    for what in ODD.values():
-        for content in files(kind, what, 3):
+        for content in files(kind, what, depth):
             check(kind, content, tmp_path)
 
 
