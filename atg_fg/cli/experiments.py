@@ -18,7 +18,7 @@ from atg_fg.display.success_plots import plot_success
 from atg_fg.experiments.document_tables import tables_of
 from atg_fg.experiments.figure3 import Figure3Log, figure3_points
 from atg_fg.experiments.scores import TestResult, actions_a_trial, summarise
-from atg_fg.experiments.table1 import TestPlan, run_tests
+from atg_fg.experiments.table1 import TestPlan, check_crops, run_tests
 from atg_fg.storage import memory_files, plain_files
 from atg_fg.storage.checked_json import without_none
 from atg_fg.storage.presets import preset as preset_named
@@ -57,6 +57,14 @@ def table1(
             rich_help_panel=options.RUNNING,
         ),
     ] = None,
+    crops: Annotated[
+        bool,
+        typer.Option(
+            "--crops",
+            help="Keep beside --records a picture of each class that a trial shows, of boxes with pictures.",
+            rich_help_panel=options.RUNNING,
+        ),
+    ] = False,
     smoothed_learning: Annotated[
         bool,
         typer.Option(
@@ -96,6 +104,8 @@ def table1(
     options.check_json_option(json_file)
     if resume and records is None:
         raise InvalidInputError("--resume: no records to go on from; expected --records with their folder")
+    if crops:
+        check_crops(records)
     if save_memories is not None and memory_files.goes_to_database(save_memories):
         plain_files.check_writable(save_memories)
         if tests > 1:
@@ -122,7 +132,7 @@ def table1(
     )
     with options.progress_bar("trials", tests * trials) as advance:
         plans = [(plan, seed + test) for test in range(tests)]
-        results = run_tests(plans, workers, records, resume, save_memories, executor, on_trials=advance)
+        results = run_tests(plans, workers, records, resume, save_memories, executor, on_trials=advance, crops=crops)
     summary = summarise(results)
     if settled is not None:
         summary["actions_a_trial"] = actions_a_trial(results)

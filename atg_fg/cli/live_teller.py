@@ -15,7 +15,7 @@ from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.errors import CameraError
 from atg_fg.core.records import TrialRecord, TrialStep
 from atg_fg.experiments.live_session import Asked, Ended, Event, LiveSession, Looked, Noted
-from atg_fg.senses.opencv import cv2
+from atg_fg.senses.opencv import png_of
 from atg_fg.storage import plain_files
 from atg_fg.storage.trial_record import to_json_lines
 
@@ -119,8 +119,7 @@ class LiveTeller:
             self._say = f"{self._verdict()}{further}"
             self._console.print(f"  {self._say}", soft_wrap=True)
         if self._pictures is not None and (picture := self._session.picture) is not None:
-            _, png = cv2.imencode(".png", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
-            plain_files.write_bytes_atomically(self._pictures / f"look-{self._n_looks:04d}.png", png.tobytes())
+            plain_files.write_bytes_atomically(self._pictures / f"look-{self._n_looks:04d}.png", png_of(picture))
         self._n_looks += 1
 
     def _tell_end(self, event: Ended) -> None:

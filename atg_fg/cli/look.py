@@ -116,12 +116,11 @@ def _check_cube(path: Path, file: Path, found: list[DetectedTag]) -> None:
 
 
 def _draw(image: NDArray[np.uint8], found: list[DetectedTag], path: Path) -> None:
-    from atg_fg.senses.opencv import cv2
+    from atg_fg.senses.opencv import png_of
     from atg_fg.senses.tag_drawing import draw_tags
 
     drawn = draw_tags(image, [(tag, str(tag.id), (0, 140, 60)) for tag in found])
-    _, png = cv2.imencode(".png", cv2.cvtColor(drawn, cv2.COLOR_RGB2BGR))
-    plain_files.write_bytes_atomically(path, png.tobytes())
+    plain_files.write_bytes_atomically(path, png_of(drawn))
 
 
 def _table(title: str, detector: TagDetector, found: list[DetectedTag]) -> Table:

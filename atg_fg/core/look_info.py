@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from atg_fg.core.looks import likely_pattern
@@ -18,6 +18,24 @@ def confidences_of(looks: Sequence[Mapping[str, Any]]) -> tuple[Confidences, ...
     """Return the confidences in the ``info`` of each look; empty if there are none at all."""
     stated = tuple(confidences_in(info) for info in looks)
     return stated if any(stated) else ()
+
+
+def surest_looks(
+    detections: Iterable[Sequence[int | None]], confidences: Iterable[Sequence[float | None]]
+) -> dict[int, tuple[int, int]]:
+    """Return for each symbol the look and the slot that show it most surely, the first of several that do.
+
+    Args:
+        detections: The symbol seen in each slot at each look, ``None`` where nothing was.
+        confidences: How sure it is; those of a look may be left out.
+    """
+    best: dict[int, tuple[float, int, int]] = {}
+    for look, (symbols, stated) in enumerate(zip(detections, confidences, strict=True)):
+        for slot, symbol in enumerate(symbols):
+            surely = (stated[slot] if stated else None) or 0.0
+            if symbol is not None and surely > best.get(symbol, (-1.0,))[0]:
+                best[symbol] = surely, look, slot
+    return {symbol: (look, slot) for symbol, (_, look, slot) in sorted(best.items())}
 
 
 def measured_in(info: Mapping[str, Any]) -> Measured:

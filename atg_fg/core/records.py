@@ -227,6 +227,7 @@ class StepSummary:
         purpose: What it is for, if the policy said so.
         log_evidence: ln p(z_0:t | a_1:t); ``None`` where it was not kept.
         expected_entropy: Of each action by name, in nats, if the policy looked at them and it was kept.
+        crops: Path of what was cut out for each slot, from the record's folder; empty if none were kept.
     """
 
     observed: Detection
@@ -238,6 +239,7 @@ class StepSummary:
     purpose: str | None = None
     log_evidence: float | None = None
     expected_entropy: dict[str, float] | None = None
+    crops: tuple[str | None, ...] = ()
 
 
 @dataclass(frozen=True)

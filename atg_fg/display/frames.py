@@ -14,11 +14,11 @@ from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.records import TrialStep
 from atg_fg.display import figures
 from atg_fg.storage import plain_files
+from atg_fg.storage.crop_folder import CROPS
 from atg_fg.worlds.base import World
 
 #: What a world with a camera offers.
 CAMERA_PICTURE: Final = "camera_picture"
-CROPS: Final = "crops"
 
 
 def has_camera(world: World) -> bool:

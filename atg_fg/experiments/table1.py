@@ -28,6 +28,7 @@ from atg_fg.inference.smoothing import smoothed_patterns
 from atg_fg.learning.duplicates import merge_duplicates
 from atg_fg.learning.structured_memory import StructuredMemory, memory_for
 from atg_fg.policies import Policy, check_entropy_threshold, make_policy
+from atg_fg.storage.crop_folder import CropFolder
 from atg_fg.storage.database.trial_log import DatabaseTrialLog, check_not_in_database
 from atg_fg.storage.growing_file import check_not_begun
 from atg_fg.storage.memory_files import goes_to_database, save_memory
@@ -91,6 +92,7 @@ def run_test(
     on_trial: Callable[[int, TrialRecord], None] | None = None,
     memories: Path | None = None,
     policy: Policy | None = None,
+    crops: bool = False,
 ) -> TestResult:
     """Run a test from an empty memory and score it.
 
@@ -104,13 +106,17 @@ def run_test(
         on_trial: Called with the number and the record of each trial that is run.
         memories: Folder in which the memory is saved at the end, or a database for the memory of one test.
         policy: Chooses the actions, and ends trials, in place of what the plan names, such as an ``AgentPolicy``.
+        crops: Keep beside the records what was cut out for each symbol of each trial (``CropFolder``).
 
     Raises:
-        InvalidInputError: The records are of another test, or already there while ``resume`` is false; or there are
-            records of a policy that the plan does not name.
+        InvalidInputError: The records are of another test, or already there while ``resume`` is false; there are
+            records of a policy that the plan does not name; or there are to be crops without a folder of records, or
+            of a world that has none.
     """
     if policy is not None and records is not None:
         raise InvalidInputError("records: of a policy that the plan does not name; expected none, or its name in it")
+    if crops:
+        check_crops(records)
     objects_seed, *trial_seeds = np.random.SeedSequence(seed).spawn(1 + plan.n_trials)
     policy = make_policy(plan.policy, plan.settled) if policy is None else policy
     score = Score()
@@ -122,14 +128,20 @@ def run_test(
             for trial in log.resume() if resume else log.begin():
                 _learn_and_score(trial, memory, plan, score)
                 step_done()
+        camera = CropFolder(_log_path(records, seed), world) if crops and records is not None else None
         first = score.n_trials
         for number in range(first, plan.n_trials):
             inference = begin_trial(plan.engine, memory, plan.parameters)
             rng = np.random.default_rng(trial_seeds[number])
-            record = run_trial(world, inference, policy, plan.n_actions, rng, is_checked=number > first)
+            on_step = None if camera is None else camera.take
+            record = run_trial(
+                world, inference, policy, plan.n_actions, rng, on_step=on_step, is_checked=number > first
+            )
             smoothed = _smoothed(inference, record) if plan.smoothed_learning else None
             trial = TrialSummary.of(record, learned_patterns=smoothed)
             trial = replace(trial, mended=_learn_and_score(trial, memory, plan, score))
+            if camera is not None:
+                trial = camera.save(number, trial)
             if log is not None:
                 log.append(trial)
             if on_trial is not None:
@@ -139,6 +151,12 @@ def run_test(
         in_folder = not goes_to_database(memories)
         save_memory(memory, make_folder(memories) / f"memory-{seed:04}.json" if in_folder else memories)
     return score.result(seed, merging=plan.merge_duplicates)
+
+
+def check_crops(records: Path | None) -> None:
+    """Raise ``InvalidInputError`` unless there is a folder of records that crops can be kept in."""
+    if records is None or goes_to_database(records):
+        raise InvalidInputError(f"crops: records {records}; expected a folder of records to keep them in")
 
 
 def _learn_and_score(trial: TrialSummary, memory: RobotMemory, plan: TestPlan, score: Score) -> tuple[Mended, ...]:
@@ -196,12 +214,13 @@ def run_tests(
     executor: str = "process",
     on_result: Callable[[int, TestResult], None] | None = None,
     on_trials: Callable[[int], None] | None = None,
+    crops: bool = False,
 ) -> list[TestResult]:
     """Run each (plan, seed), beginning in this order, and return the results in this order.
 
     The results are the same for any executor and any number of jobs; see ``executors.run_pieces`` for these and for
-    ``on_result``. ``records``, ``resume`` and ``memories`` are as for ``run_test``; all workers must have the folders.
-    ``on_trials`` is called in this thread with the number of trials that were done since the last call.
+    ``on_result``. ``records``, ``resume``, ``memories`` and ``crops`` are as for ``run_test``; all workers must have
+    the folders. ``on_trials`` is called in this thread with the number of trials that were done since the last call.
 
     Raises:
         InvalidInputError: As for ``run_test`` and ``run_pieces``.
@@ -212,7 +231,7 @@ def run_tests(
             _check_not_begun(plan, seed, records)
     # A worker always resumes: a worker that died has left a part of the test to it.
     resolved = None if memories is None else Path(os.path.realpath(memories))
-    run = partial(_run_one_of, records=records, memories=resolved)
+    run = partial(_run_one_of, records=records, memories=resolved, crops=crops)
 
     def keep(number: int, result: TestResult) -> None:
         if on_result is not None:
@@ -223,6 +242,5 @@ def run_tests(
     return run_pieces(run, plans, executor, jobs, keep, on_trials)
 
 
-def _run_one_of(piece: tuple[TestPlan, int], records: Path | None, memories: Path | None) -> TestResult:
-    plan, seed = piece
-    return run_test(plan, seed, records, resume=True, memories=memories)
+def _run_one_of(piece: tuple[TestPlan, int], records: Path | None, memories: Path | None, crops: bool) -> TestResult:
+    return run_test(*piece, records, resume=True, memories=memories, crops=crops)

@@ -95,7 +95,7 @@ class _Taught:
         stated = None if self._memory is None else self._memory.assumptions
         if experiment is not None and experiment.kind == TEST_KIND:
             test = stored_test(self._path, experiment, stated)
-            return test_report(test) if test.trials else None
+            return test_report(test, None) if test.trials else None
         assumptions, about = stated or arcube_assumptions(), {} if experiment is None else experiment.parameters
         # The memory that is there now may be of another world than the one that the trials were run in.
         if experiment is not None and about.get("world") in list(WORLDS):

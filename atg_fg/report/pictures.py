@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import base64
 import struct
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from pathlib import Path, PurePosixPath
-from typing import Any, Final
+from typing import Final
 
 from atg_fg.core import checks
 from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.look_info import surest_looks
+from atg_fg.core.records import StepSummary
 from atg_fg.storage.checked_json import read_list
 from atg_fg.storage.plain_files import is_plain_file
 
@@ -20,39 +22,35 @@ _MOST_CROP_BYTES: Final = 200_000
 _MOST_CROP_SIDE: Final = 256
 
 
-def thumbnails(
-    looks: Iterable[tuple[Sequence[int | None], object, object]], folder: Path, place: str
-) -> dict[int, str]:
+def thumbnails(looks: Iterable[tuple[str, StepSummary]], folder: Path) -> dict[int, str]:
     """Return for each symbol the crop that shows it most surely, the first one of several, as a ``data:`` address.
 
     Args:
-        looks: Of each look the symbols that were seen, and what the record has as confidences and as paths of crops,
-            ``None`` without.
+        looks: Each look, and where it is, to be named in errors.
         folder: Where the record is.
-        place: Named in errors.
 
     Raises:
-        InvalidInputError: Not an entry for each slot, or one that is of no small PNG in the folder.
+        InvalidInputError: A crop that is no small PNG in the folder, or confidences that are none.
     """
-    best: dict[int, tuple[float, object, str]] = {}
-    for number, (symbols, confidences, crops) in enumerate(looks):
-        if crops is None:
-            continue
-        where = f"{place}: line {number + 2}"
-        paths = _of_slots(crops, len(symbols), f"{where}: crops")
-        stated = _of_slots(confidences or [None] * len(symbols), len(symbols), f"{where}: truth: confidences")
-        for slot, (symbol, path, sure) in enumerate(zip(symbols, paths, stated, strict=True)):
-            surely = 0.0 if sure is None else checks.number(sure, f"{where}: truth: confidences[{slot}]", 0.0, 1.0)
-            if symbol is not None and path is not None and surely > best.get(symbol, (-1.0,))[0]:
-                best[symbol] = (surely, path, f"{where}: crops[{slot}]")
-    return {symbol: _crop_address(crop, folder, where) for symbol, (_, crop, where) in sorted(best.items())}
+    kept = [(place, step) for place, step in looks if step.crops]
+    shown = [
+        [None if path is None else symbol for symbol, path in zip(step.observed, step.crops, strict=True)]
+        for _, step in kept
+    ]
+    sure = [_confidences(step, f"{place}: truth: confidences") for place, step in kept]
+    return {
+        symbol: _crop_address(kept[look][1].crops[slot], folder, f"{kept[look][0]}: crops[{slot}]")
+        for symbol, (look, slot) in surest_looks(shown, sure).items()
+    }
 
 
-def _of_slots(value: object, n_slots: int, place: str) -> list[Any]:
-    entries = read_list(value, place)
-    if len(entries) != n_slots:
-        raise InvalidInputError(f"{place}: {len(entries)} entries; expected {n_slots}")
-    return entries
+def _confidences(step: StepSummary, place: str) -> list[float | None]:
+    stated = read_list(step.truth.get("confidences") or [], place)
+    if len(stated) not in (0, len(step.observed)):
+        raise InvalidInputError(f"{place}: {len(stated)} entries; expected {len(step.observed)}")
+    return [
+        None if sure is None else checks.number(sure, f"{place}[{slot}]", 0.0, 1.0) for slot, sure in enumerate(stated)
+    ]
 
 
 def _crop_address(name: object, folder: Path, place: str) -> str:

@@ -61,7 +61,7 @@ def _report_of(path: Path, memory: RobotMemory | None) -> Report:
         if _is_goal_run(start):
             return read_goal_run(path, memory)
         (test,) = recorded_tests(path, None if memory is None else memory.assumptions)
-        return test_report(test)
+        return test_report(test, path.parent)
     if is_compact(path):
         return gallery(load_memory(path), path.name)
     text = read_text_file(path)

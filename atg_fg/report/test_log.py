@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import Final
 
 from atg_fg.core.assumptions import Assumptions
@@ -22,6 +23,7 @@ from atg_fg.experiments.scores import Score
 from atg_fg.experiments.trial import can_be_learned, learn_from
 from atg_fg.policies import EntropyPolicy
 from atg_fg.report.content import Look, Report, TrialPage, shown_parameters
+from atg_fg.report.pictures import thumbnails
 from atg_fg.report.summaries import looks_of, told_mistakes, told_truth, told_verdict, with_graphs
 from atg_fg.report.trial_record import best_objects
 from atg_fg.storage.checked_json import placed
@@ -35,8 +37,17 @@ _NOT_INFERRED: Final = (
 )
 
 
-def test_report(test: RecordedTest) -> Report:
+#: Crops that a page takes, characters: of a hundred trials with pictures there are some three millions.
+_MOST_CROPS: Final = 20_000_000
+_CROPS_LEFT_OUT: Final = "There are more crops than a page takes: later trials are shown with numbers of symbols."
+
+
+def test_report(test: RecordedTest, folder: Path | None) -> Report:
     """Return the page of a recorded test's trials.
+
+    Args:
+        test: What was recorded.
+        folder: Where its log is, with crops beside it; ``None`` if it is in a database.
 
     Raises:
         InvalidInputError: There are none, or they do not follow from each other.
@@ -47,13 +58,22 @@ def test_report(test: RecordedTest) -> Report:
     merging = bool(test.header.get("merge_duplicates"))
     told = Retelling(test.assumptions, inferred=not (test.parameters.learn_structure or merging), merging=merging)
     by_entropy = test.header.get("policy", EntropyPolicy.name) == EntropyPolicy.name
-    pages = []
+    pages, crops, room = [], dict[int, str](), _MOST_CROPS
     for number, trial in enumerate(test.trials):
         with placed(f"{test.place}: trial {number}"):
-            pages.append(told.page(trial, f"trial {number}", test.parameters, by_entropy=by_entropy))
+            page = told.page(trial, f"trial {number}", test.parameters, by_entropy=by_entropy)
+            if folder is not None and room > 0:
+                looks = ((f"look {look}", step) for look, step in enumerate(trial.steps))
+                crops.update(thumbnails(looks, folder))
+                drawn = {symbol for graph in page.graphs for aspect in graph.aspects for symbol in aspect}
+                page = replace(page, thumbnails={each: crops[each] for each in sorted(drawn & crops.keys())})
+                room -= sum(map(len, page.thumbnails.values()))
+            pages.append(page)
     pages = with_mended(pages, test.trials)
     title = f"A test of {len(pages)} trials, {told.score.successes} of them right"
-    notes = () if told.inferred else (_NOT_INFERRED,)
+    bare = [trial for trial, page in zip(test.trials, pages, strict=True) if not page.thumbnails]
+    left_out = folder is not None and any(step.crops for trial in bare for step in trial.steps)
+    notes = (*(() if told.inferred else (_NOT_INFERRED,)), *((_CROPS_LEFT_OUT,) if left_out else ()))
     return Report(title, shown_parameters(test.header), notes, test.assumptions, tuple(pages))
 
 

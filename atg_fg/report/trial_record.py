@@ -82,12 +82,7 @@ def read_trial_record(text: str, path: Path, memory: RobotMemory | None) -> Repo
         graphs=(),
         notes=told_mistakes(trial, assumptions),
         thumbnails=thumbnails(
-            (
-                (read.observed, read.truth.get("confidences"), step.get("crops"))
-                for (read, _), step in zip(looks, steps, strict=True)
-            ),
-            path.parent,
-            str(path),
+            ((f"{path}: line {number}", read) for number, (read, _) in enumerate(looks, 2)), path.parent
         ),
     )
     page = with_graphs(page, [look for _, look in looks], memory, assumptions, trial.matched)

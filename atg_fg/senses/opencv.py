@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import os
 
+import numpy as np
+from numpy.typing import NDArray
+
 from atg_fg.core.errors import MissingDependencyError
 from atg_fg.senses.frame_reader import MOST_PIXELS
 
@@ -19,4 +22,9 @@ except ImportError as error:
         'pip install "atg-fg[vision]"'
     ) from error
 
-__all__ = ["cv2"]
+__all__ = ["cv2", "png_of"]
+
+
+def png_of(picture: NDArray[np.uint8]) -> bytes:
+    """Return an RGB picture, shape [height, width, 3], as PNG."""
+    return bytes(cv2.imencode(".png", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))[1])

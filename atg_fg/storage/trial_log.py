@@ -37,6 +37,7 @@ def to_line(trial: TrialSummary) -> dict[str, Any]:
             "unseen": [step.unseen for step in trial.steps],
             "entropy": [step.entropy for step in trial.steps],
             "purpose": purposes if any(purposes) else None,
+            "crops": [step.crops or None for step in trial.steps] if any(step.crops for step in trial.steps) else None,
             "truth": list(trial.truths),
             "learned": None if patterns is None else list(patterns),
             "mistakes": [list(each) for each in trial.mistakes] or None,
@@ -57,7 +58,7 @@ def from_line(line: Any, place: str, assumptions: Assumptions | None = None) -> 
     Raises:
         InvalidInputError: Anything in it is not as it should be.
     """
-    fields = read_object(line, place, _KEYS, optional=("purpose", "learned", "mistakes", "mended"))
+    fields = read_object(line, place, _KEYS, optional=("purpose", "crops", "learned", "mistakes", "mended"))
     looks = len(read_list(fields["observed"], f"{place}: observed"))
     lost = fields["verdict"] == "lost"
     actions = list(read_list(fields["actions"], f"{place}: actions"))
@@ -71,6 +72,7 @@ def from_line(line: Any, place: str, assumptions: Assumptions | None = None) -> 
             ("unseen", looks),
             ("entropy", looks),
             ("purpose", looks),
+            ("crops", looks),
             ("truth", looks + lost),
         )
     }
@@ -78,7 +80,7 @@ def from_line(line: Any, place: str, assumptions: Assumptions | None = None) -> 
         read_step(
             {
                 "observed": fields["observed"][time],
-                **{name: columns[name][time] for name in ("unseen", "entropy", "purpose", "truth")},
+                **{name: column[time] for name, column in columns.items()},
                 "action": actions[time],
             },
             f"{place}: look {time}",
@@ -94,6 +96,7 @@ def read_step(fields: Mapping[str, Any], place: str, assumptions: Assumptions | 
     """Return one look of a record; arguments and errors are those of ``from_line``."""
     observed = _detection(fields["observed"], f"{place}: observed", assumptions)
     action, purpose, log_evidence, expected = map(fields.get, ("action", "purpose", "log_evidence", "expected_entropy"))
+    crops = [] if fields.get("crops") is None else _column(fields["crops"], f"{place}: crops", len(observed))
     if action is not None and assumptions is not None:
         action = one_of(action, f"{place}: action", assumptions.actions)
     if assumptions is None:
@@ -111,6 +114,7 @@ def read_step(fields: Mapping[str, Any], place: str, assumptions: Assumptions | 
         None if purpose is None else plain_text(purpose, f"{place}: purpose"),
         None if log_evidence is None else number(log_evidence, f"{place}: log_evidence"),
         None if expected is None else _expected(expected, f"{place}: expected_entropy", assumptions),
+        tuple(None if each is None else plain_text(each, f"{place}: crops[{slot}]") for slot, each in enumerate(crops)),
     )
 
 

@@ -1,5 +1,7 @@
 import base64
+import gzip
 import json
+import shutil
 
 import numpy as np
 import pytest
@@ -55,6 +57,44 @@ def test_crops_of_what_was_seen_are_kept_and_stand_for_their_classes(run, tmp_pa
     ]
     assert address.removeprefix("data:image/png;base64,") in taken
     assert all(look.shown is None for look in page.looks)  # pictures have other numbers than classes
+
+
+def test_a_picture_of_each_class_that_a_trial_shows_is_kept_beside_a_test(run, tmp_path):
+    pytest.importorskip("cv2")
+    records, whole, log = tmp_path / "a", tmp_path / "b", "test-0000.jsonl.gz"
+    quick = ["table1", "--world", "picture-box", "--engine", "bayes-filter", "--tests", "1", "--actions", "3"]
+    quick += ["--objects", "2", "--trials", "3", "--crops", "--records"]
+    assert run(*quick, whole)[0] == 0
+    shutil.copytree(whole, records)
+    lines = gzip.decompress((whole / log).read_bytes()).splitlines(keepends=True)
+    (records / log).write_bytes(b"".join(gzip.compress(line) for line in lines[:2]))  # cut off in the second trial
+    for crop in (records / "test-0000.crops").glob("trial-00[12]*"):
+        crop.unlink()
+    assert run(*quick, records, "--resume")[0] == 0
+    assert gzip.decompress((records / log).read_bytes()) == b"".join(lines)
+    kept = [
+        {file.name: file.read_bytes() for file in (each / "test-0000.crops").iterdir()} for each in (whole, records)
+    ]
+    assert kept[0] == kept[1]
+    trials = [json.loads(line) for line in lines[1:]]
+    for trial in trials:
+        looks = zip(trial["observed"], trial["crops"], strict=True)
+        shown = [symbol for look, crops in looks for symbol, crop in zip(look, crops, strict=True) if crop]
+        assert sorted(shown) == sorted({symbol for look in trial["observed"] for symbol in look} - {None})
+    assert sum(len(list(filter(None, crops))) for trial in trials for crops in trial["crops"]) == len(kept[0])
+    pages = read_report(whole / log).trials
+    addresses = ["data:image/png;base64," + base64.b64encode(content).decode() for content in kept[0].values()]
+    for page in pages:
+        drawn = {symbol for graph in page.graphs for aspect in graph.aspects for symbol in aspect}
+        assert set(page.thumbnails) == drawn
+        assert set(page.thumbnails.values()) <= set(addresses)
+
+
+def test_crops_beside_a_test_need_a_folder_and_a_world_that_has_some(refused, tmp_path):
+    quick = ["table1", "--engine", "bayes-filter", "--tests", "1", "--trials", "2", "--actions", "2", "--crops"]
+    assert "crops: records None; expected a folder" in refused(*quick)
+    assert "expected a folder of records" in refused(*quick, "--records", tmp_path / "trials.db")
+    assert "offers no crops; expected a world of boxes" in refused(*quick, "--records", tmp_path / "trials")
 
 
 def test_the_robots_camera_offers_the_same(tmp_path):

@@ -1,11 +1,14 @@
 """Pictures beside a record: of each look, and the crops that stand for symbols."""
 
 import base64
+import gzip
+import json
 import struct
 
 import pytest
 
 from atg_fg.core.errors import InvalidInputError
+from atg_fg.experiments.table1 import TestPlan, run_test
 from atg_fg.report.reading import read_report
 from tests.report.test_reading import changed
 
@@ -47,6 +50,27 @@ def test_the_crop_that_shows_a_symbol_most_surely_stands_for_it(record, tmp_path
     }
 
 
+def test_a_page_takes_so_many_crops_of_a_test(tmp_path, monkeypatch):
+    run_test(TestPlan(engine="bayes-filter", n_trials=3, n_actions=2, n_objects=4), 3, tmp_path)
+    log, crop = tmp_path / "test-0003.jsonl.gz", tmp_path / "a.png"
+    crop.write_bytes(png(48))
+    header, *trials = map(json.loads, gzip.decompress(log.read_bytes()).splitlines())
+    for trial in trials:
+        trial["crops"] = [["a.png", None] for _ in trial["observed"]]
+    log.write_bytes(gzip.compress("".join(json.dumps(line) + "\n" for line in (header, *trials)).encode()))
+    report = read_report(log)
+    assert all(page.thumbnails for page in report.trials)
+    assert report.notes == ()
+    room = sum(map(len, report.trials[0].thumbnails.values()))
+    monkeypatch.setattr("atg_fg.report.test_log._MOST_CROPS", room)
+    report = read_report(log)
+    assert [bool(page.thumbnails) for page in report.trials] == [True, False, False]
+    assert report.notes == ("There are more crops than a page takes: later trials are shown with numbers of symbols.",)
+    crop.unlink()
+    with pytest.raises(InvalidInputError, match=r"trial 0: look [0-2]: crops\[0\]: 'a.png' is no file"):
+        read_report(log)
+
+
 @pytest.mark.parametrize(
     ("crops", "message"),
     [
@@ -57,7 +81,7 @@ def test_the_crop_that_shows_a_symbol_most_surely_stands_for_it(record, tmp_path
         (["none.png", None], r"crops\[0\]: 'none.png'; expected a PNG of at most 256 pixels a side"),
         (["photo.jpg", None], r"crops\[0\]: 'photo.jpg'; expected a PNG of at most"),
         (["heavy.png", None], r"crops\[0\]: 'heavy.png'; expected a PNG or JPEG picture of at most 200,000 bytes"),
-        ([7, None], r"crops\[0\]: 7; expected the path"),
+        ([7, None], r"crops\[0\]: 7; expected a text"),
     ],
 )
 def test_a_crop_that_is_no_small_picture_is_refused(record, tmp_path, crops, message):

@@ -71,6 +71,22 @@ def test_mistakes_and_mended_verdicts_are_read_back_and_checked():
             from_line({**line, key: value}, "here", ASSUMPTIONS)
 
 
+def test_paths_of_crops_are_read_back_and_checked():
+    trial = TrialSummary.of(a_record(9))
+    crops = [("a.png", None), *[()] * (len(trial.steps) - 1)]
+    trial = replace(trial, steps=[replace(step, crops=each) for step, each in zip(trial.steps, crops, strict=True)])
+    (line,) = lines_of([trial])
+    assert [step.crops for step in from_line(line, "here", ASSUMPTIONS).steps] == crops
+    for value, message in (
+        (["a.png", None], rf"here: crops: 2 entries; expected {len(crops)}"),
+        ([["a.png"], *line["crops"][1:]], r"here: look 0: crops: 1 entries; expected 2"),
+        ([[7, None], *line["crops"][1:]], r"here: look 0: crops\[0\]: 7; expected a text"),
+        (["a.png", *line["crops"][1:]], r"here: look 0: crops: 'a.png'; expected a list"),
+    ):
+        with pytest.raises(InvalidInputError, match=message):
+            from_line({**line, "crops": value}, "here", ASSUMPTIONS)
+
+
 def test_the_file_is_plain_gzip_with_a_line_a_trial(path, records):
     log = a_log(path)
     log.begin()
