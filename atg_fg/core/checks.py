@@ -7,9 +7,12 @@ from collections.abc import Collection, Iterable, Sequence
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from atg_fg.core.errors import InvalidInputError
 
+#: Numbers of arrays are not greater, so that sums of their squares are numbers, too.
+GREATEST: Final = 1e100
 #: Names that an error message tells.
 _LISTED: Final = 24
 
@@ -55,6 +58,40 @@ def number(
         ends = f"to below {below:g}" if below < math.inf else f"to {most:g}" if most < math.inf else ""
         bounds = f" from {least:g} {ends}" if ends else f" of at least {least:g}" * (least > -math.inf)
         raise InvalidInputError(f"{place}: {brief(value)}; expected a finite number{bounds}")
+    return found
+
+
+def floats(value: Any, place: str, expected: str) -> NDArray[np.float64]:
+    """Return ``value`` as an array of floats, or raise ``InvalidInputError`` unless it is one of real numbers.
+
+    Args:
+        value: What is checked; it is not copied if it is of floats already.
+        place: Named in the error.
+        expected: What the error says is expected.
+    """
+    try:
+        return np.asarray(value).astype(np.float64, casting="same_kind", copy=False)
+    except (TypeError, ValueError) as error:  # texts, complex numbers, or rows of several lengths
+        raise InvalidInputError(f"{place}: {brief(value)}; expected {expected}") from error
+
+
+def finite_array(value: Any, place: str, shape: Sequence[int | None], expected: str) -> NDArray[np.float64]:
+    """Return ``value`` as ``floats`` does, but only if it is of this shape, and squares of its numbers are finite.
+
+    Args:
+        value: What is checked.
+        place: Named in the error.
+        shape: ``None`` stands for any length.
+        expected: What the error says is expected.
+    """
+    found = floats(value, place, expected)
+    fits = len(shape) == found.ndim and all(want in (None, is_) for want, is_ in zip(shape, found.shape, strict=True))
+    if not fits:
+        raise InvalidInputError(f"{place}: shape {found.shape}; expected {expected}")
+    if not (np.abs(found) <= GREATEST).all():
+        n_infinite = int((~np.isfinite(found)).sum())
+        what = f"{n_infinite} not finite" if n_infinite else f"{np.abs(found).max():g}"
+        raise InvalidInputError(f"{place}: {what}; expected finite numbers{'' if n_infinite else f' to {GREATEST:g}'}")
     return found
 
 

@@ -21,7 +21,7 @@ def imported(kind: str, name: str) -> Any:
         name: Words with dots between them, a colon, and the name of an object in that module.
 
     Raises:
-        InvalidInputError: There is no such module, or no such object in it.
+        InvalidInputError: There is no such module, it fails when it is imported, or there is no such object in it.
     """
     place, expected = f"{kind} {name!r}", "expected module:object, on Python's path"
     module, _, attribute = name.partition(":")
@@ -29,8 +29,8 @@ def imported(kind: str, name: str) -> Any:
         raise InvalidInputError(f"{place}: cannot be imported: no name of a module; {expected}")
     try:
         found = import_module(module)
-    except (ImportError, ValueError) as error:
-        raise InvalidInputError(f"{place}: cannot be imported: {error}; {expected}") from error
+    except (Exception, SystemExit) as error:  # whatever a user's module does
+        raise InvalidInputError(f"{place}: cannot be imported: {told(error)}; {expected}") from error
     for part in attribute.split("."):
         if not hasattr(found, part):
             raise InvalidInputError(f"{place}: {module} has no {attribute!r}; expected module:object")
@@ -52,7 +52,13 @@ def loaded(kind: str, entry: EntryPoint) -> Any:
     """
     try:
         return entry.load()
-    except (ImportError, AttributeError) as error:
+    except (Exception, SystemExit) as error:
         raise InvalidInputError(
-            f"{kind} {entry.name!r}: cannot be imported from {entry.value}: {error}; expected an object there"
+            f"{kind} {entry.name!r}: cannot be imported from {entry.value}: {told(error)}; expected an object there"
         ) from error
+
+
+def told(error: BaseException) -> str:
+    """Return in one line what went wrong in code of a user's own."""
+    what = " ".join(str(error).split())
+    return what if isinstance(error, ImportError) else f"{type(error).__name__}{what and f': {what}'}"

@@ -9,6 +9,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import ArrayLike
 
+from atg_fg.core.checks import finite_array, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import MISSING, Detection, Evidence, FloatArray, IntArray, PatternAlphabet
 from atg_fg.core.sense import Reading, Readings, SensedLook, SensedTrial
@@ -103,7 +104,7 @@ class AppearanceSense:
         """Learn from a trial that has ended; see ``Sense.learn``.
 
         Raises:
-            InvalidInputError: Readings of another length than the codebook's.
+            InvalidInputError: Readings of another length than the codebook's or not finite, or classes there are not.
         """
         self.restore([trial])
         if not _is_milestone(len(self.trials)):
@@ -124,21 +125,33 @@ class AppearanceSense:
         return [each.detections for each in self.trials]
 
     def restore(self, trials: Sequence[SensedTrial]) -> None:
-        """Add trials that were learned from, as they were taken then."""
+        """Add trials that were learned from, as they were taken then; all of them, or none if one is refused.
+
+        Raises:
+            InvalidInputError: As for ``learn``.
+        """
+        expected = f"{self.space.n_dimensions} numbers, as in the codebook of {self.features!r}"
+        added: list[tuple[FloatArray, int]] = []
         for trial in trials:
+            if len(trial.detections) != len(trial.readings):
+                raise InvalidInputError(f"readings: {len(trial.readings)} looks; expected {len(trial.detections)}")
             for look, (readings, detection) in enumerate(zip(trial.readings, trial.detections, strict=True)):
-                for slot, (reading, symbol) in enumerate(zip(readings, detection, strict=True)):
+                place = f"readings: look {look}"
+                if not len(readings) == len(detection) == len(self.alphabet.slots):
+                    raise InvalidInputError(
+                        f"{place}: {len(readings)} slots, {len(detection)} classes; expected {len(self.alphabet.slots)}"
+                    )
+                for slot, reading, symbol in zip(self.alphabet.slots, readings, detection, strict=True):
                     if reading is None:
                         continue
-                    if len(reading) != self.space.n_dimensions:
-                        place = f"readings: look {look}, slot {self.alphabet.slots[slot]!r}"
-                        raise InvalidInputError(
-                            f"{place}: {len(reading)} numbers; expected {self.space.n_dimensions}, "
-                            f"as in the codebook of {self.features!r}"
-                        )
+                    where = f"{place}, slot {slot!r}"
+                    point = finite_array(reading, where, (self.space.n_dimensions,), expected)
                     if symbol is not None:
-                        self.codebook.add(np.array(reading), symbol)
-            self.trials.append(trial)
+                        most = self.alphabet.n_symbols - 1
+                        added.append((point, whole_number(symbol, f"{where}: class", 0, most)))
+        for point, symbol in added:
+            self.codebook.add(point, symbol)
+        self.trials += trials
 
     def _looks(self) -> tuple[FloatArray, IntArray]:
         """Return all readings, shape [N, D], and the class of each, shape [N]."""
@@ -190,22 +203,21 @@ class AppearanceTrial:
         Raises:
             InvalidInputError: Features that are missing, of another length than the codebook's, or not finite.
         """
-        n_slots = len(self.alphabet.slots)
+        n_slots, slots = len(self.alphabet.slots), ", ".join(self.alphabet.slots)
         try:
-            seen, appearance = np.asarray(observation[SEEN]), observation[APPEARANCE]
+            seen, appearance = observation[SEEN], observation[APPEARANCE]
+            n_looks = len(appearance)
         except (KeyError, TypeError, IndexError) as error:
             raise InvalidInputError(
                 f"observation: {observation!r:.60}; expected {APPEARANCE!r} and {SEEN!r} of {n_slots} slots"
             ) from error
-        if seen.shape != (n_slots,) or len(appearance) != n_slots:
-            raise InvalidInputError(
-                f"observation: {len(appearance)} slots, {seen.shape} seen; expected {n_slots}: "
-                f"{', '.join(self.alphabet.slots)}"
-            )
+        there = finite_array(seen, f"observation: {SEEN!r}", (n_slots,), f"0 or 1 of each slot: {slots}")
+        if n_looks != n_slots:
+            raise InvalidInputError(f"observation: {n_looks} slots; expected {n_slots}: {slots}")
         return self.look_at(
             tuple(
-                tuple(self.space.encode(features, f"observation: slot {slot!r}").tolist()) if there else None
-                for slot, features, there in zip(self.alphabet.slots, appearance, seen, strict=True)
+                tuple(self.space.encode(features, f"observation: slot {slot!r}").tolist()) if is_seen else None
+                for slot, features, is_seen in zip(self.alphabet.slots, appearance, there, strict=True)
             )
         )
 

@@ -19,7 +19,7 @@ from typing import Final, NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike
 
-from atg_fg.core.checks import number, whole_number
+from atg_fg.core.checks import GREATEST, finite_array, floats, number, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.log_math import log_sum_exp
 from atg_fg.core.patterns import MISSING, FloatArray, IntArray
@@ -61,8 +61,12 @@ class Codebook:
     """
 
     def __init__(self, between: ArrayLike, most: int, *, within: float = 1.0, concentration: float = 1.0) -> None:
-        self.between = np.array(between, dtype=np.float64)
-        if self.between.ndim != 1 or not len(self.between) or not (self.between > 0).all():
+        self.between = floats(between, "codebook: between", "variances above 0").copy()
+        if (
+            self.between.ndim != 1
+            or not len(self.between)
+            or not ((self.between > 0) & (self.between <= GREATEST)).all()
+        ):
             raise InvalidInputError(f"codebook: between {between!r:.60}; expected variances above 0")
         self.most = whole_number(most, "codebook: classes", 1, MOST_CLASSES)
         self.within = number(within, "codebook: within", least=1e-12)
@@ -89,7 +93,16 @@ class Codebook:
         return twin
 
     def add(self, look: FloatArray, number: int, times: float = 1.0) -> None:
-        """Let a look of shape [D] fall into a class; ``times`` −1 takes it out again."""
+        """Let a look of shape [D] fall into a class; ``times`` −1 takes it out again.
+
+        Raises:
+            InvalidInputError: A look of another length, not finite, or a class that there is not.
+        """
+        look = self._checked(look)
+        whole_number(number, "codebook: class", 0, self.most - 1)
+        if self.counts[number] + times < 0:
+            held = f"class {number} has {self.counts[number]:g} looks"
+            raise InvalidInputError(f"codebook: {held}; expected {-times:g} that can be taken out")
         self.counts[number] += times
         self.sums[number] += times * look
         if self.counts[number] == 0:
@@ -97,6 +110,7 @@ class Codebook:
 
     def log_densities(self, look: FloatArray) -> tuple[FloatArray, float]:
         """Return ln p(z | class) of each number, shape [V], −∞ without looks, and ln p(z | a class never met)."""
+        look = self._checked(look)
         grown = 1.0 + self.counts[:, None] * self._ratio
         variance = self.within * (1.0 + self._ratio / grown)
         residual = look - self._ratio * self.sums / grown
@@ -129,6 +143,7 @@ class Codebook:
 
     def log_evidence(self, looks: FloatArray, labels: IntArray) -> float:
         """Return ln p(looks, which fall together), of looks of shape [N, D] and their classes, shape [N]."""
+        looks, labels = self._all_checked(looks, labels)
         n_looks = len(labels)
         order = np.arange(n_looks) + self.concentration
         classes = [looks[labels == each] for each in np.unique(labels)]
@@ -153,7 +168,7 @@ class Codebook:
             looks: All that there are, shape [N, D].
             labels: The class of each so far, ``MISSING`` of those without one, shape [N].
         """
-        given = np.array(labels, dtype=np.int64)
+        looks, given = self._all_checked(looks, labels)
         current = given.copy()
         self._fill(looks, current)
         for _ in range(_MOST_ROUNDS):
@@ -165,6 +180,23 @@ class Codebook:
         current = _renumbered(current, given, self.most)
         self._fill(looks, current)
         return current
+
+    def _checked(self, look: FloatArray) -> FloatArray:
+        """Return a look as an array of shape [D]; of one that is an array already, next to no time is spent."""
+        is_array = isinstance(look, np.ndarray) and look.dtype == np.float64 and look.shape == self.between.shape
+        if is_array and np.abs(look).max() <= GREATEST:
+            return look
+        return finite_array(look, "look", self.between.shape, f"{len(self.between)} numbers, as in the codebook")
+
+    def _all_checked(self, looks: FloatArray, labels: Sequence[int] | IntArray) -> tuple[FloatArray, IntArray]:
+        expected = f"looks of {len(self.between)} numbers, as in the codebook"
+        found = finite_array(looks, "looks", (None, len(self.between)), expected)
+        classes = [
+            whole_number(label, f"labels[{index}]", MISSING, self.most - 1) for index, label in enumerate(labels)
+        ]
+        if len(classes) != len(found):
+            raise InvalidInputError(f"labels: {len(classes)}; expected one for each of {len(found)} looks")
+        return found, np.array(classes, dtype=np.int64)
 
     def _fill(self, looks: FloatArray, labels: IntArray) -> None:
         self.counts, self.sums = np.zeros_like(self.counts), np.zeros_like(self.sums)

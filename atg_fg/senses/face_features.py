@@ -6,15 +6,16 @@ turns of a crop make a signal over the group C₄, and the magnitudes of its Fou
 
 from __future__ import annotations
 
-import importlib
 from collections.abc import Callable
 from typing import Final, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
+from atg_fg.core.checks import finite_array, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import FloatArray
+from atg_fg.core.plugins import imported, told
 
 Image: TypeAlias = NDArray[np.uint8]
 #: Turns a crop, RGB of shape [height, width, 3], into features of shape [F].
@@ -103,7 +104,13 @@ def rectified(frame: Image, corners: FloatArray, size: int = CROP) -> Image:
         frame: RGB.
         corners: Of the square in the frame, clockwise from its upper left one, shape [4, 2], pixels.
         size: Side of what is returned, pixels.
+
+    Raises:
+        InvalidInputError: A frame that is not RGB, or corners that are not four points.
     """
+    check_image(frame, "frame")
+    corners = finite_array(corners, "corners", (4, 2), "four corners (x, y), pixels")
+    whole_number(size, "size", 1)
     from atg_fg.senses.opencv import cv2
 
     square = np.array([[0, 0], [size, 0], [size, size], [0, size]], dtype=np.float32)
@@ -124,22 +131,24 @@ def face_features(name: str) -> FaceFeatures:
     Such a name runs code: it is to come from a user, never from a file.
 
     Raises:
-        InvalidInputError: There is no such function.
+        InvalidInputError: There is no such function; what is returned raises it for a function that fails, or returns
+            anything but finite numbers along one axis.
     """
-    if name in _FEATURES:
+    if isinstance(name, str) and name in _FEATURES:
         return _FEATURES[name]
-    module, _, attribute = name.partition(":")
-    try:
-        found = getattr(importlib.import_module(module), attribute) if module and attribute else None
-    except (ImportError, AttributeError, ValueError) as error:
-        raise InvalidInputError(f"features: {name!r}: {error}; expected module:function on Python's path") from error
+    found = imported("features", name) if isinstance(name, str) and ":" in name else None
     if not callable(found):
         raise InvalidInputError(f"features: {name!r}; expected {', '.join(map(repr, _FEATURES))} or module:function")
 
     def checked(crop: Image) -> FloatArray:
-        values: FloatArray = np.asarray(found(crop), dtype=np.float64)
-        if values.ndim != 1 or not np.isfinite(values).all():
-            raise InvalidInputError(f"features: {name!r}: shape {values.shape}; expected finite numbers, one axis")
+        try:
+            made = np.asarray(found(crop))
+        except (Exception, SystemExit) as error:  # whatever a user's function does
+            given = f"a crop of shape {getattr(crop, 'shape', ())}"
+            raise InvalidInputError(f"features {name!r}: {given}: {told(error)}; expected numbers of it") from error
+        values = finite_array(made, f"features {name!r}", (None,), "numbers along one axis")
+        if not len(values):
+            raise InvalidInputError(f"features {name!r}: no numbers; expected at least one")
         return values
 
     return checked

@@ -13,7 +13,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from atg_fg.core.checks import whole_number
+from atg_fg.core.checks import finite_array, floats, plain_text, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import FloatArray, read_only
 
@@ -48,7 +48,9 @@ class FeatureSpace:
 
     def __post_init__(self) -> None:
         for name in ("mean", "projection", "between"):
-            object.__setattr__(self, name, read_only(np.array(getattr(self, name), dtype=np.float64)))
+            array = floats(getattr(self, name), f"feature space: {name}", "numbers").copy()
+            object.__setattr__(self, name, read_only(array))
+        plain_text(self.features, "feature space: features")
         shapes = (self.mean.shape, self.projection.shape, self.between.shape)
         if self.projection.ndim != 2 or shapes != (
             self.projection.shape[:1],
@@ -84,11 +86,15 @@ class FeatureSpace:
         Raises:
             InvalidInputError: Fewer than two things or looks, or features that are not finite or all alike.
         """
-        values = np.asarray(looks, dtype=np.float64)
+        place, expected = (
+            f"calibration of {features!r}",
+            "as many features of each look, at as many looks of each thing",
+        )
+        values = floats(looks, place, expected)
         whole_number(n_dimensions, "dimensions", 1)
         if values.ndim != 3 or min(values.shape[:2]) < 2 or not np.isfinite(values).all():
             raise InvalidInputError(
-                f"calibration: features of shape {values.shape}; expected finite ones, at least two looks at each of "
+                f"{place}: features of shape {values.shape}; expected finite ones, at least two looks at each of "
                 "two things"
             )
         mean = values.mean(axis=(0, 1))
@@ -100,7 +106,7 @@ class FeatureSpace:
         n_free = residuals.shape[0] - values.shape[0]
         within = np.atleast_2d((residuals @ directions).T @ (residuals @ directions) / n_free)
         if not float(np.trace(within)) > _LEAST_SCATTER**2 * float(scatter[0]) ** 2:
-            raise InvalidInputError("calibration: all looks at a thing are the same; expected looks that differ")
+            raise InvalidInputError(f"{place}: all looks at a thing are the same; expected looks that differ")
         variance, axes = np.linalg.eigh(within)
         variance = (1 - _SHRINKAGE) * variance + _SHRINKAGE * float(variance.mean())
         whitening = directions @ (axes / np.sqrt(variance))
@@ -108,7 +114,7 @@ class FeatureSpace:
         between = between - 1.0 / values.shape[1]  # means of R looks scatter by themselves
         best = [each for each in np.argsort(-between)[:n_dimensions] if between[each] > 0]
         if not best:
-            raise InvalidInputError("calibration: things do not differ; expected features that tell them apart")
+            raise InvalidInputError(f"{place}: things do not differ; expected features that tell them apart")
         return cls(features, mean, whitening @ axes[:, best], between[best])
 
     def encode(self, features: ArrayLike, place: str = "features") -> FloatArray:
@@ -117,16 +123,7 @@ class FeatureSpace:
         Raises:
             InvalidInputError: Of another length than F, or not finite.
         """
-        try:
-            values = np.asarray(features, dtype=np.float64)
-        except (TypeError, ValueError) as error:
-            raise InvalidInputError(f"{place}: {features!r:.60}; expected {self.n_features} numbers") from error
-        if values.shape != self.mean.shape:
-            raise InvalidInputError(
-                f"{place}: shape {values.shape}; expected {self.n_features} numbers, as of {self.features!r}"
-            )
-        if not np.isfinite(values).all():
-            raise InvalidInputError(f"{place}: {int((~np.isfinite(values)).sum())} not finite; expected finite numbers")
+        values = finite_array(features, place, self.mean.shape, f"{self.n_features} numbers, as of {self.features!r}")
         point: FloatArray = np.round((values - self.mean) @ self.projection, DECIMALS)
         return point
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from atg_fg.core.assumptions import Assumptions
-from atg_fg.core.checks import number, plain_text
+from atg_fg.core.checks import GREATEST, number, plain_text
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.sense import Reading, Sense, SensedTrial
 from atg_fg.senses.appearance import AppearanceSense
@@ -108,8 +108,4 @@ def _numbers(value: Any, place: str, length: int) -> list[float]:
     found: Sequence[Any] = read_list(value, place)
     if len(found) != length:
         raise InvalidInputError(f"{place}: {len(found)} numbers; expected {length}")
-    return [number(entry, f"{place}[{index}]", -_GREATEST, _GREATEST) for index, entry in enumerate(found)]
-
-
-#: Beyond, sums of squares would no longer be numbers.
-_GREATEST = 1e100
+    return [number(entry, f"{place}[{index}]", -GREATEST, GREATEST) for index, entry in enumerate(found)]

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import pytest
 
-from atg_fg.core.checks import brief, distinct_names, number, one_of, plain_text, whole_number
+from atg_fg.core.checks import brief, distinct_names, finite_array, floats, number, one_of, plain_text, whole_number
 from atg_fg.core.errors import InvalidInputError
 
 
@@ -65,3 +65,37 @@ def test_a_value_is_told_in_brief_however_large_it_is():
         endless = [endless]
     for value in (10**5000, "x" * 1000, endless, ["\ud800"] * 50):
         assert len(brief(value).encode()) <= 60
+
+
+@pytest.mark.parametrize(
+    "value", [[1, 2], (1.0, 2.0), np.array([1, 2], dtype=np.int8), np.array([1.0, 2.0], dtype=np.float16)]
+)
+def test_numbers_come_back_as_an_array_of_floats(value):
+    for found in (floats(value, "here", "numbers"), finite_array(value, "here", (2,), "two numbers")):
+        assert found.dtype == np.float64
+        assert found.tolist() == [1.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("value", "message"),
+    [
+        (None, "here: None; expected two numbers"),
+        ("ab", "here: 'ab'; expected two numbers"),
+        (["1", "2"], r"here: \['1', '2'\]; expected two numbers"),
+        ([[1, 2], [3]], r"here: \[\[1, 2\], \[3\]\]; expected two numbers"),
+        ([1j, 2], "expected two numbers"),
+        ([1, None], r"here: \[1, None\]; expected two numbers"),
+        (1.0, r"here: shape \(\); expected two numbers"),
+        ([1, 2, 3], r"here: shape \(3,\); expected two numbers"),
+        ([[1, 2]], r"here: shape \(1, 2\); expected two numbers"),
+        ([math.nan, -math.inf], "here: 2 not finite; expected finite numbers"),
+        ([1.0, -1e101], r"here: 1e\+101; expected finite numbers to 1e\+100"),
+    ],
+)
+def test_what_is_no_array_of_finite_numbers_of_a_shape_is_refused(value, message):
+    with pytest.raises(InvalidInputError, match=message):
+        finite_array(value, "here", (2,), "two numbers")
+
+
+def test_any_length_may_do():
+    assert finite_array(np.ones((3, 2)), "here", (None, 2), "pairs").shape == (3, 2)

@@ -33,6 +33,27 @@ def test_what_is_not_there_is_one_line(name, message):
         plugins.imported("thing", name)
 
 
+@pytest.mark.parametrize(
+    ("module", "told"),
+    [
+        ("raise RuntimeError('no weights\\nin /models')", "RuntimeError: no weights in /models"),
+        ("def f(:", "SyntaxError: "),
+        ("import sys; sys.exit('bye')", "SystemExit: bye"),
+        ("import nowhere_at_all", "No module named 'nowhere_at_all'"),
+        ("assert False", "AssertionError; expected"),
+    ],
+)
+def test_a_module_that_fails_when_it_is_imported_is_one_line(module, told, tmp_path, monkeypatch):
+    name = f"failing_{abs(hash(module))}"
+    (tmp_path / f"{name}.py").write_text(module)
+    monkeypatch.syspath_prepend(str(tmp_path))
+    entry = EntryPoint("mine", f"{name}:thing", "atg_fg.engines")
+    for get in (lambda: plugins.imported("thing", f"{name}:thing"), lambda: plugins.loaded("thing", entry)):
+        with pytest.raises(InvalidInputError, match=f"cannot be imported.*: {told}") as refused:
+            get()
+        assert "\n" not in str(refused.value)
+
+
 def test_an_object_inside_of_another_is_found():
     assert plugins.imported("thing", "json:JSONDecoder.decode").__name__ == "decode"
 

@@ -144,12 +144,25 @@ def test_readings_of_another_length_are_refused_and_nothing_is_learned():
     sense = AppearanceSense(SPACE, ALPHABET)
     memory = RobotMemory(Assumptions(3, 6, ("turn",), ALPHABET), sense=sense)
     name = memory.learn([0], [], None)
-    with pytest.raises(
-        InvalidInputError, match="slot 'front': 2 numbers; expected 1, as in the codebook of 'one-number'"
+    look, place = ((1.0,), None), "look 1, slot 'front'"
+    for readings, detection, message in (
+        (
+            ((1.0, 2.0), None),
+            (0, None),
+            rf"{place}: shape \(2,\); expected 1 numbers, as in the codebook of 'one-number'",
+        ),
+        (((np.nan,), None), (0, None), f"{place}: 1 not finite"),
+        (((1.0,), None), (99, None), f"{place}: class: 99; expected a whole number from 0 to"),
+        (((1.0,),), (0,), "look 1: 1 slots, 1 classes; expected 2"),
     ):
-        memory.learn_readings(name, [((1.0, 2.0), None)], [(0, None)], [])
-    assert memory.sense.trials == []
-    assert sense.codebook.n_classes == 0
+        with pytest.raises(InvalidInputError, match=message):
+            memory.learn_readings(name, [look, readings], [(0, None), detection], [0])
+        with pytest.raises(InvalidInputError, match=message):
+            sense.restore([SensedTrial(name, (look, readings), ((0, None), detection), (0,))])
+    with pytest.raises(InvalidInputError, match="readings: 1 looks; expected 2"):
+        sense.restore([SensedTrial(name, (look,), ((0, None), (0, None)), (0,))])
+    assert memory.sense.trials == sense.trials == []
+    assert memory.sense.codebook.n_classes == sense.codebook.n_classes == 0
 
 
 @pytest.mark.parametrize(
@@ -157,7 +170,12 @@ def test_readings_of_another_length_are_refused_and_nothing_is_learned():
     [
         ([0, 1], "expected 'appearance' and 'seen' of 2 slots"),
         ({APPEARANCE: np.zeros((2, 1))}, "expected 'appearance' and 'seen' of 2 slots"),
-        ({APPEARANCE: np.zeros((1, 1)), SEEN: np.ones(2)}, r"1 slots, \(2,\) seen; expected 2: front, top"),
+        ({APPEARANCE: None, SEEN: np.ones(2)}, "expected 'appearance' and 'seen' of 2 slots"),
+        ({APPEARANCE: np.zeros((1, 1)), SEEN: np.ones(2)}, "1 slots; expected 2: front, top"),
+        ({APPEARANCE: np.zeros((2, 1)), SEEN: np.ones(3)}, r"'seen': shape \(3,\); expected 0 or 1 of each slot"),
+        ({APPEARANCE: np.zeros((2, 1)), SEEN: ("yes", "no")}, "'seen': .*; expected 0 or 1 of each slot: front, top"),
+        ({APPEARANCE: np.zeros((2, 1)), SEEN: (np.nan, 1)}, "'seen': 1 not finite"),
+        ({APPEARANCE: np.full((2, 1), 1e200), SEEN: np.ones(2)}, r"slot 'front': 1e\+200; expected finite numbers to"),
         ({APPEARANCE: np.zeros((2, 3)), SEEN: np.ones(2)}, r"slot 'front': shape \(3,\); expected 1 numbers"),
         ({APPEARANCE: np.full((2, 1), np.inf), SEEN: np.ones(2)}, "slot 'front': 1 not finite"),
     ],

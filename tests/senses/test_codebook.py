@@ -135,6 +135,8 @@ def test_beliefs_are_distributions_and_a_look_taken_out_leaves_no_trace(looks, l
     [
         ([], {}, "expected variances above 0"),
         ([1.0, 0.0], {}, "expected variances above 0"),
+        ([np.inf], {}, "expected variances above 0"),
+        ("many", {}, "codebook: between: 'many'; expected variances above 0"),
         ([1.0], {"within": 0.0}, "codebook: within: 0"),
         ([1.0], {"within": float("nan")}, "codebook: within: nan"),
         ([1.0], {"concentration": -1.0}, "codebook: concentration: -1"),
@@ -143,3 +145,48 @@ def test_beliefs_are_distributions_and_a_look_taken_out_leaves_no_trace(looks, l
 def test_a_codebook_of_nonsense_is_refused(between, options, message):
     with pytest.raises(InvalidInputError, match=message):
         Codebook(between, 4, **options)
+
+
+@pytest.mark.parametrize(
+    ("look", "message"),
+    [
+        ([1.0, 2.0], r"look: shape \(2,\); expected 1 numbers, as in the codebook"),
+        (1.0, r"look: shape \(\); expected 1 numbers"),
+        ([[1.0]], r"look: shape \(1, 1\); expected 1 numbers"),
+        ([np.nan], "look: 1 not finite"),
+        (["a"], "look: .*; expected 1 numbers"),
+    ],
+)
+def test_a_look_of_another_length_or_of_no_numbers_is_refused(look, message):
+    book = Codebook(ONE_DIMENSION, 4)
+    calls = (book.log_densities, book.likelihood, book.posterior, lambda each: book.add(each, 0))
+    for value, call in itertools.product((look, np.array(look)), calls):
+        with pytest.raises(InvalidInputError, match=message):
+            call(value)
+    assert book.n_classes == 0
+
+
+def test_classes_that_there_are_not_and_looks_that_nobody_put_there_are_refused():
+    book = Codebook(ONE_DIMENSION, 4)
+    for number in (-1, 4, 1.0):
+        with pytest.raises(InvalidInputError, match=f"codebook: class: {number}; expected a whole number from 0 to 3"):
+            book.add(np.zeros(1), number)
+    with pytest.raises(InvalidInputError, match="codebook: class 2 has 0 looks; expected 1 that can be taken out"):
+        book.add(np.zeros(1), 2, -1)
+    assert book.counts.tolist() == [0, 0, 0, 0]
+
+
+@pytest.mark.parametrize(
+    ("looks", "labels", "message"),
+    [
+        (np.zeros((2, 3)), [0, 0], r"looks: shape \(2, 3\); expected looks of 1 numbers"),
+        ([[0.0], [np.inf]], [0, 0], "looks: 1 not finite"),
+        (np.zeros((2, 1)), [0], "labels: 1; expected one for each of 2 looks"),
+        (np.zeros((2, 1)), [0, 4], r"labels\[1\]: 4; expected a whole number from -1 to 3"),
+    ],
+)
+def test_looks_and_labels_that_do_not_fit_are_refused(looks, labels, message):
+    book = Codebook(ONE_DIMENSION, 4)
+    for call in (book.refit, book.log_evidence):
+        with pytest.raises(InvalidInputError, match=message):
+            call(looks, labels)
