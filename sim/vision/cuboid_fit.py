@@ -14,6 +14,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from atg_fg.core.checks import floats
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import FloatArray
 from sim.vision.camera import Camera
@@ -23,6 +24,8 @@ _BIN: Final = 0.005
 #: What is level is this near to its height, m, and this share of all that was measured.
 _LEVEL: Final = 0.008
 _LEAST_SHARE: Final = 0.03
+#: Nothing is looked at that is farther, m: one pixel's error must not make for millions of bins.
+_FARTHEST: Final = 100.0
 #: No box is lower, m.
 _LOWEST_TOP: Final = 0.03
 _ROUNDS: Final = 3
@@ -63,7 +66,8 @@ def points_of(depth: Any, camera: Camera) -> FloatArray:
     """Return the points of a depth image in the frame that the camera is placed in, shape [height, width, 3], m.
 
     Args:
-        depth: Along the camera's axis, floats of shape [height, width], m; zero or NaN where nothing was measured.
+        depth: Along the camera's axis, floats of shape [height, width], m; zero or NaN where nothing was measured;
+            what is farther than 100 m is left out.
         camera: Where it is and how it sees.
 
     Raises:
@@ -74,14 +78,21 @@ def points_of(depth: Any, camera: Camera) -> FloatArray:
     if not floats or depth.shape != size:
         found = f"shape {np.shape(depth)} of {getattr(depth, 'dtype', type(depth).__name__)}"
         raise InvalidInputError(f"depth: {found}; expected floats of shape {size}, m")
-    distance = np.where(np.isfinite(depth) & (depth > 0), depth, np.nan).astype(np.float64)
+    distance = np.where((depth > 0) & (depth < _FARTHEST), depth, np.nan).astype(np.float64)
     if np.isnan(distance).all():
         raise InvalidInputError(f"depth: nothing was measured in {depth.size} pixels; expected m in some of them")
     return np.asarray((camera.rays * distance[..., None]) @ camera.rotation.T + np.array(camera.eye))
 
 
 def find_tabletop(points: FloatArray) -> Tabletop:
-    """Return the table and the box in points of shape [height, width, 3], m, whose z is up; NaN where there is none."""
+    """Return the table and the box in points of shape [height, width, 3], m, whose z is up; NaN where there is none.
+
+    Raises:
+        InvalidInputError: Points of another shape.
+    """
+    points = floats(points, "points", "x, y and z of each pixel, m")
+    if points.ndim != 3 or points.shape[2] != 3:
+        raise InvalidInputError(f"points: shape {points.shape}; expected [height, width, 3], m")
     heights = points[..., 2]
     total = np.isfinite(heights).sum()
     levels = _levels(heights, total)
@@ -105,7 +116,7 @@ def find_tabletop(points: FloatArray) -> Tabletop:
 
 def _levels(heights: FloatArray, total: int) -> list[float]:
     """Return the heights at which so much is that it must be level, from the lowest."""
-    finite = heights[np.isfinite(heights)]
+    finite = heights[np.abs(heights) < _FARTHEST]
     if not finite.size:
         return []
     lowest = float(finite.min())

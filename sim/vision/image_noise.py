@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import cv2
 import numpy as np
@@ -11,6 +12,9 @@ from numpy.typing import NDArray
 from atg_fg.core.errors import InvalidInputError
 from sim.vision.camera import Camera, Light
 from sim.vision.depth_noise import noisy_depth
+
+#: A frame is never taken for darker beside usual light: of a black one nothing can be evened out.
+_DARKEST: Final = 1 / 255
 
 
 @dataclass(frozen=True)
@@ -70,8 +74,8 @@ class Imaging:
 
 
 def in_usual_light(frame: NDArray[np.uint8], lightness: float) -> NDArray[np.uint8]:
-    """Return a frame, RGB, as it would be in usual light, beside which it is so light now."""
-    return np.clip(np.round(frame / np.float32(lightness)), 0, 255).astype(np.uint8)
+    """Return a frame, RGB, as it would be in usual light, beside which it is so light now; black stays black."""
+    return np.clip(np.round(frame / np.float32(max(lightness, _DARKEST))), 0, 255).astype(np.uint8)
 
 
 def at_least_zero(name: str, value: float) -> float:

@@ -55,3 +55,9 @@ def test_a_frame_of_another_size_or_type_is_refused(frame):
     camera = PictureBoxCamera(Camera(), **STILL)
     with pytest.raises(InvalidInputError, match=r"frame: shape .* expected RGB bytes, 320 by 240 pixels"):
         camera.crops(frame)
+
+
+def test_of_a_black_frame_what_is_cut_out_is_black():
+    crops = PictureBoxCamera(Camera(), **STILL).crops(np.zeros((240, 320, 3), np.uint8))
+    assert crops.shape == (2, 48, 48, 3)
+    assert not crops.any()

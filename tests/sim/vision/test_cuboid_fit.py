@@ -130,10 +130,18 @@ def test_what_is_no_depth_image_is_refused_in_one_line(depth, message):
     assert "\n" not in str(refused.value)
 
 
+@pytest.mark.parametrize("points", [None, "cloud", np.zeros((30, 40)), np.zeros((30, 40, 4)), [[1.0, 2.0, 3.0]]])
+def test_what_are_no_points_is_refused_in_one_line(points):
+    with pytest.raises(InvalidInputError, match=r"points: .*; expected .* m$") as refused:
+        find_tabletop(points)
+    assert "\n" not in str(refused.value)
+
+
 def test_infinite_and_missing_depths_are_left_out():
     depth = depth_image(np.array([0.42, 0.0, 0.30]))
     depth[::7] = np.nan
     depth[3::7] = np.inf
+    depth[5, ::50], depth[6, ::50] = 1e30, -np.inf  # of which a height would be more bins than there is memory for
     position, angle = errors(found_in(depth), np.array([0.42, 0.0, 0.30]), 0.0)
     assert position.max() < 0.006
     assert angle < 1.0
