@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-import ctypes
 import importlib.util
-import os
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 
 from atg_fg.core.errors import MissingDependencyError
+from atg_fg.core.silence import silenced
 
 _REQUIRED = {"pybullet": "pybullet", "cv2": "opencv-python-headless"}
 
@@ -34,22 +31,3 @@ def import_quietly(module: str) -> None:
     sys.stderr.flush()
     with silenced(2):
         importlib.import_module(module)
-
-
-@contextmanager
-def silenced(stream: int) -> Iterator[None]:
-    """Drop what C code prints on standard output (1) or standard error (2) meanwhile.
-
-    PyBullet tells on standard output what it thinks of a robot, where a command's JSON goes.
-    """
-    flush = ctypes.CDLL(None).fflush if os.name == "posix" else lambda _: None
-    flush(None)
-    kept, nowhere = os.dup(stream), os.open(os.devnull, os.O_WRONLY)
-    try:
-        os.dup2(nowhere, stream)
-        yield
-    finally:
-        flush(None)
-        os.dup2(kept, stream)
-        os.close(kept)
-        os.close(nowhere)

@@ -77,7 +77,7 @@ Settled = Annotated[
 ]
 Seed = Annotated[int, typer.Option(min=0, help="Seed; test number k uses seed + k.", rich_help_panel=TRIALS)]
 Actions = Annotated[int, typer.Option(min=1, help="Actions a trial.", rich_help_panel=TRIALS)]
-Tests = Annotated[int, typer.Option(min=1, help="Number of tests.", rich_help_panel=TRIALS)]
+Tests = Annotated[int, typer.Option(min=1, max=100_000, help="Number of tests.", rich_help_panel=TRIALS)]
 Trials = Annotated[int, typer.Option(min=1, help="Trials a test.", rich_help_panel=TRIALS)]
 Jobs = Annotated[
     int | None,

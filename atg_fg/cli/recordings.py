@@ -13,6 +13,7 @@ import typer
 from atg_fg.cli import options
 from atg_fg.cli.terminal import say
 from atg_fg.core.assumptions import Assumptions
+from atg_fg.core.checks import brief
 from atg_fg.core.errors import InvalidInputError, MissingDependencyError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
@@ -25,7 +26,14 @@ from atg_fg.experiments.scores import Score
 from atg_fg.learning.predictive_checks import summary_of_evidence, too_many_graphs
 from atg_fg.learning.structured_memory import StructuredMemory, memory_for
 from atg_fg.storage import plain_files
-from atg_fg.storage.memory_files import goes_to_database, has_memory, load_memory, open_memory, save_memory
+from atg_fg.storage.memory_files import (
+    check_holds,
+    goes_to_database,
+    has_memory,
+    load_memory,
+    open_memory,
+    save_memory,
+)
 from atg_fg.storage.presets import preset as preset_named
 from atg_fg.storage.recording_oddities import oddities
 from atg_fg.storage.recordings import (
@@ -84,10 +92,11 @@ def learn(
     recordings = [read_recording(file, given) for file in files]
     if name is not None:
         recordings = [each.taught_as(name) for each in recordings]
-    with closing(_memory_for(memory, recordings, parameters)) as kept:
+    teaches = teach or name is not None
+    with closing(_memory_for(memory, recordings, parameters, teaches=teaches)) as kept:
         with options.progress_bar("trials", sum(len(each.trials) for each in recordings)) as advance:
             for each in recordings:
-                if teach or name is not None:
+                if teaches:
                     recorded_trials.teach(each, kept, advance)
                 else:
                     recorded_trials.learn(each, kept, chosen, parameters, advance)
@@ -134,15 +143,14 @@ def recognise(
     with closing(_memory_for(memory, recordings, parameters, keeps=learns)) as kept:
         presented = {trial.object for each in recordings for trial in each.trials}
         made_from: dict[str, object] = {name: name for name in kept.names if name in presented}
-        is_known = None not in presented
-        scores = Score(made_from) if learns and is_known else None
+        scores = Score(made_from) if learns and None not in presented else None
         found: list[recorded_trials.Recognised] = []
         with options.progress_bar("trials", sum(len(each.trials) for each in recordings)) as advance:
             for each in recordings:
                 found += recorded_trials.recognise(
                     each, kept, chosen, parameters, learn=learns, scores=scores, on_trial=advance
                 )
-        if is_known and not learns:
+        if not learns and presented != {None}:
             made_from = recorded_trials.names_by_majority(found, made_from)
             scores, found = recorded_trials.scored_afterwards(found, made_from)
         scored = None if scores is None else recorded_trials.score_document(scores)
@@ -182,16 +190,28 @@ def given_spec(
     exclusive: bool | None,
 ) -> RecordingSpec:
     """Return what options say, and else what the spec file does."""
-    said = RecordingSpec(_listed(slots), _listed(actions), _listed(labels), objects, aspects, exclusive)
+    said = RecordingSpec(
+        _listed(slots, "slots"), _listed(actions, "actions"), _listed(labels, "labels"), objects, aspects, exclusive
+    )
     return said if spec is None else merged_spec(said, read_spec(spec))
 
 
-def _listed(text: str | None) -> tuple[str, ...] | None:
-    return None if text is None else tuple(name.strip() for name in text.split(","))
+def _listed(text: str | None, option: str) -> tuple[str, ...] | None:
+    if text is None:
+        return None
+    names = tuple(name.strip() for name in text.split(","))
+    if not all(names) or len(set(names)) < len(names):
+        raise InvalidInputError(f"--{option}: {brief(text)}; expected names, all different, with commas between them")
+    return names
 
 
 def _memory_for(
-    path: Path, recordings: Sequence[Recording], parameters: ModelParameters, *, keeps: bool = True
+    path: Path,
+    recordings: Sequence[Recording],
+    parameters: ModelParameters,
+    *,
+    keeps: bool = True,
+    teaches: bool = False,
 ) -> RobotMemory:
     """Return the memory in a file, or a new one, that knows the labels of all recordings.
 
@@ -200,6 +220,10 @@ def _memory_for(
         recordings: What it is to take.
         parameters: Of the model.
         keeps: Whether what it learns goes to the file.
+        teaches: Whether the recordings have to name an object for each trial.
+
+    Raises:
+        InvalidInputError: It cannot take all of them; then nothing is learned from any, nor is a file begun.
     """
     if keeps:
         plain_files.check_writable(path)
@@ -208,15 +232,24 @@ def _memory_for(
     elif has_memory(path):
         held = open_memory(path)
     else:
-        assumptions = _extended(recordings[0].assumptions(), recordings)
+        assumptions = _extended(recordings[0].assumptions(), recordings, teaches)
         held = open_memory(path, assumptions) if goes_to_database(path) else RobotMemory(assumptions)
-    held.extend(_extended(held.assumptions, recordings).alphabet.names)
-    return memory_for(parameters, held)
+    try:
+        held.extend(_extended(held.assumptions, recordings, teaches).alphabet.names)
+        memory = memory_for(parameters, held)
+        if keeps and not held.is_kept:
+            check_holds(memory, path)
+    except InvalidInputError:
+        held.close()
+        raise
+    return memory
 
 
-def _extended(assumptions: Assumptions, recordings: Sequence[Recording]) -> Assumptions:
+def _extended(assumptions: Assumptions, recordings: Sequence[Recording], teaches: bool) -> Assumptions:
     for each in recordings:
         assumptions = assumptions_for(each, assumptions)
+    for each in recordings:
+        recorded_trials.check(each, assumptions, taught=teaches)
     return assumptions
 
 
@@ -246,7 +279,13 @@ def _evidence_of(memory: RobotMemory) -> dict[str, Any]:
 
 def _warnings(memory: RobotMemory, evidence: dict[str, Any], recordings: Sequence[Recording]) -> list[str]:
     """Return which assumptions do not seem to hold, by what was learned and what was recorded."""
+    n_objects = memory.assumptions.n_objects
     return [
+        *(
+            f"{each.place}: {each.n_objects} objects; the memory was begun for {n_objects}, which counts"
+            for each in recordings
+            if each.n_objects not in (None, n_objects)
+        ),
         *(evidence.get("warnings") or too_many_graphs(memory)),
         *(
             f"{each.place}: {odd.what}"

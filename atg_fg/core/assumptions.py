@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from atg_fg.core.checks import distinct_names, whole_number
+from atg_fg.core.checks import brief, distinct_names, listed, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.object_sense import ObjectSense, check_object_senses
 from atg_fg.core.patterns import PatternAlphabet
@@ -73,7 +73,7 @@ class Assumptions:
     def action_index(self, name: str, place: str = "action") -> int:
         """Return the index of an action, or raise ``InvalidInputError`` naming ``place``."""
         if not isinstance(name, str) or name not in self.actions:
-            raise InvalidInputError(f"{place}: {name!r}; expected one of: {', '.join(self.actions)}")
+            raise InvalidInputError(f"{place}: {brief(name)}; expected one of: {listed(self.actions)}")
         return self.actions.index(name)
 
 

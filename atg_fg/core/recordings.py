@@ -120,10 +120,13 @@ class Recording:
         n_objects = n_objects or self.n_objects
         if n_objects is None:
             raise InvalidInputError(f"{self.place}: does not say how many objects there are; expected --objects N")
-        alphabet = PatternAlphabet.named(self.slots, self.labels, exclusive=self.exclusive, is_open=is_open)
-        n_aspects = self.n_aspects or min(len(alphabet), USUAL_ASPECTS)
-        senses = tuple(self._sense(each) if isinstance(each, str) else each for each in self.senses)
-        return Assumptions(n_objects, n_aspects, self.actions, alphabet, senses)
+        try:
+            alphabet = PatternAlphabet.named(self.slots, self.labels, exclusive=self.exclusive, is_open=is_open)
+            n_aspects = self.n_aspects or min(len(alphabet), USUAL_ASPECTS)
+            senses = tuple(self._sense(each) if isinstance(each, str) else each for each in self.senses)
+            return Assumptions(n_objects, n_aspects, self.actions, alphabet, senses)
+        except InvalidInputError as error:
+            raise InvalidInputError(f"{self.place}: {error}") from error
 
     def _sense(self, name: str) -> ObjectSense:
         """Return what the readings of a sense say of it: actions reveal one if a reading mostly comes after them."""

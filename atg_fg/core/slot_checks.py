@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,13 +12,17 @@ from numpy.typing import ArrayLike
 from atg_fg.core.checks import brief
 from atg_fg.core.errors import InvalidInputError
 
+#: Greatest weight of a slot, and its inverse the least, that is left on its scale: products of 16 are still numbers.
+_GREATEST: Final = 1e15
+
 
 def check_slots(
     likelihoods: Sequence[ArrayLike | None], slots: Sequence[str], n_symbols: int, place: str = "likelihoods"
 ) -> tuple[tuple[float, ...] | None, ...]:
     """Return likelihoods of each slot's symbols as tuples, or raise ``InvalidInputError`` naming ``place``.
 
-    None at all are as good.
+    None at all are as good. Only their ratios count: those of a slot whose greatest is beyond what can be multiplied
+    are divided by it.
     """
     if len(likelihoods) not in (0, len(slots)):
         raise InvalidInputError(f"{place}: {len(likelihoods)}; expected one for each of {len(slots)} slots, or none")
@@ -35,11 +40,13 @@ def check_slots(
             raise InvalidInputError(
                 f"{where}: shape {weights.shape}; expected a weight for each of {n_symbols} symbols"
             )
-        if not (weights.min() >= 0 and 0 < weights.sum() < np.inf):  # a NaN is neither
+        greatest = weights.max()
+        if not (weights.min() >= 0 and 0 < greatest < np.inf):  # a NaN is neither
             raise InvalidInputError(
                 f"{where}: {brief(weights.tolist())}; expected finite ones of at least 0, not all 0"
             )
-        result.append(tuple(weights.tolist()))
+        is_usual = 1 / _GREATEST <= greatest <= _GREATEST
+        result.append(tuple((weights if is_usual else weights / greatest).tolist()))
     return tuple(result)
 
 

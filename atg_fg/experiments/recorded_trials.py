@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
+from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.look_info import measured_in, truth_of
 from atg_fg.core.memory import RobotMemory
@@ -114,7 +115,7 @@ def learn(
 
 def _raw(trial: RecordedTrial, memory: RobotMemory, place: str) -> RawTrial | None:
     """Return what a memory learns from a trial, ``None`` if that is nothing."""
-    looks = _evidence(trial, memory, place)
+    looks = _evidence(trial, memory.assumptions, place)
     actions = _actions(trial, memory)
     record = TrialRecord.from_looks(memory.assumptions, looks, actions)
     return RawTrial.of(looks, actions, memory.assumptions.alphabet) if can_be_learned(TrialSummary.of(record)) else None
@@ -124,15 +125,17 @@ def teach(recording: Recording, memory: RobotMemory, on_trial: Callable[[], None
     """Learn from each trial as one of the object that the recording names; return from how many there was to learn.
 
     Raises:
-        InvalidInputError: A trial names no object.
+        InvalidInputError: A trial names no object; nothing was learned then.
     """
+    check(recording, memory.assumptions, taught=True)
     taught = 0
     for trial in recording.trials:
-        if trial.object is None:
-            raise InvalidInputError(f"{recording.place}: trial {trial.name}: no object; expected one, to be taught")
         matched = trial.object if trial.object in memory.names else None
         record = TrialRecord.from_looks(
-            memory.assumptions, _evidence(trial, memory, recording.place), _actions(trial, memory), trial.object
+            memory.assumptions,
+            _evidence(trial, memory.assumptions, recording.place),
+            _actions(trial, memory),
+            trial.object,
         )
         summary = TrialSummary.of(record)
         if can_be_learned(summary):
@@ -144,11 +147,25 @@ def teach(recording: Recording, memory: RobotMemory, on_trial: Callable[[], None
     return taught
 
 
-def _evidence(trial: RecordedTrial, memory: RobotMemory, place: str) -> list[Evidence]:
+def check(recording: Recording, assumptions: Assumptions, *, taught: bool = False) -> None:
+    """Raise ``InvalidInputError`` if a trial cannot be learned from: before any is, lest half of them be learned.
+
+    Args:
+        recording: Its labels are known to the assumptions.
+        assumptions: Of the memory that is to learn.
+        taught: Whether each trial has to name its object.
+    """
+    for trial in recording.trials:
+        if taught and trial.object is None:
+            raise InvalidInputError(f"{recording.place}: trial {trial.name}: no object; expected one, to be taught")
+        _evidence(trial, assumptions, recording.place)
+
+
+def _evidence(trial: RecordedTrial, assumptions: Assumptions, place: str) -> list[Evidence]:
     looks = []
     for step, look in enumerate(trial.looks):
         try:
-            looks.append(look.evidence(memory.assumptions))
+            looks.append(look.evidence(assumptions))
         except InvalidInputError as error:
             raise InvalidInputError(f"{place}: trial {trial.name}, step {step}: {error}") from error
     return looks
@@ -161,7 +178,7 @@ def _actions(trial: RecordedTrial, memory: RobotMemory) -> list[int]:
 def _recognised(
     trial: RecordedTrial, memory: RobotMemory, engine: str, parameters: ModelParameters, place: str
 ) -> TrialRecord:
-    looks = _evidence(trial, memory, place)
+    looks = _evidence(trial, memory.assumptions, place)
     truths = [truth_of(look, trial.object) for look in looks]
     return follow(begin_trial(engine, memory, parameters), looks, _actions(trial, memory), truths)
 
@@ -170,11 +187,14 @@ def scored_afterwards(found: Sequence[Recognised], made_from: dict[str, object])
     """Return the scores of trials that were not learned from, and the trials with what is right.
 
     Args:
-        found: The trials.
+        found: The trials; those whose truth is not known are not scored.
         made_from: The object that each ATG was made from.
     """
     scores = Score(made_from, learns=False)
-    return scores, [each._replace(right=scores.add(TrialSummary.of(each.record), None)) for each in found]
+    return scores, [
+        each if each.trial.object is None else each._replace(right=scores.add(TrialSummary.of(each.record), None))
+        for each in found
+    ]
 
 
 def score_document(scores: Score) -> dict[str, Any]:
@@ -200,7 +220,7 @@ def names_by_majority(found: Sequence[Recognised], made_from: dict[str, object])
     """
     votes: dict[str, Counter[object]] = {}
     for each in found:
-        if each.record.matched is not None:
+        if each.record.matched is not None and each.trial.object is not None:
             votes.setdefault(each.record.matched, Counter())[each.trial.object] += 1
     return {**{name: counts.most_common(1)[0][0] for name, counts in votes.items()}, **made_from}
 

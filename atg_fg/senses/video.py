@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atg_fg.core.errors import CameraError, InvalidInputError
+from atg_fg.core.silence import silenced
 from atg_fg.senses import frame_reader
 from atg_fg.senses.opencv import cv2
 
@@ -175,7 +176,8 @@ def read_image(path: str | Path) -> NDArray[np.uint8]:
     """
     check_plain_file(path, "an image")
     try:
-        image = cv2.imread(str(path), cv2.IMREAD_COLOR)
+        with silenced(2):
+            image = cv2.imread(str(path), cv2.IMREAD_COLOR)
     except cv2.error as error:
         raise InvalidInputError(
             f"{path}: cannot be read; expected an image of at most {frame_reader.MOST_PIXELS} pixels"

@@ -47,16 +47,20 @@ def save_memory(memory: RobotMemory, path: Path | str) -> None:
     Raises:
         InvalidInputError: The file cannot be written, or arrays cannot hold this memory; what was there is as it was.
     """
+    check_holds(memory, path)
     if goes_to_database(path):
         save_database(memory, path)
     elif is_compact(path):
-        if memory.merges or isinstance(memory, StructuredMemory):
-            raise InvalidInputError(
-                f"{path}: merges or a learned structure; expected ATGs alone, as arrays keep no more"
-            )
         save_compact_memory(CompactMemory.of(memory), path)
     else:
         write_bytes_atomically(path, memory_to_json(memory).encode())
+
+
+def check_holds(memory: RobotMemory, path: Path | str) -> None:
+    """Raise ``InvalidInputError`` if what goes to ``path`` cannot hold such a memory: called before long work, too."""
+    has_more = bool(memory.merges) or isinstance(memory, StructuredMemory)
+    if has_more and not goes_to_database(path) and is_compact(path):
+        raise InvalidInputError(f"{path}: merges or a learned structure; expected ATGs alone, as arrays keep no more")
 
 
 def save_trial(memory: RobotMemory, path: Path | str, trial: TrialSummary, experiment: Experiment) -> None:

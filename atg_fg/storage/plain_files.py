@@ -7,6 +7,7 @@ nothing to replace.
 
 from __future__ import annotations
 
+import codecs
 import contextlib
 import os
 import secrets
@@ -70,7 +71,7 @@ def read_text_file(path: Path | str, *, packed: bool = False) -> str:
 
     Args:
         path: The file.
-        packed: Whether it may be gzipped.
+        packed: Whether it may be gzipped, or UTF-16 with a byte order mark, as spreadsheets write it.
 
     Raises:
         InvalidInputError: It cannot be read, or is not UTF-8.
@@ -79,10 +80,13 @@ def read_text_file(path: Path | str, *, packed: bool = False) -> str:
     content = read_bytes_file(path)
     if packed and content.startswith(GZIP):
         content = _unpacked(content, path, "expected a gzipped text file")
+    encoding = "utf-16" if packed and content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else "utf-8"
     try:
-        return content.decode("utf-8").replace("\r\n", "\n").replace("\r", "\n")
-    except UnicodeError as error:
-        what = "a gzipped file" if content.startswith(GZIP) else f"not UTF-8: {error}"
+        return content.decode(encoding).replace("\r\n", "\n").replace("\r", "\n")
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        what = f"line {line}: byte 0x{content[error.start]:02x}, not {encoding.upper()}"
+        what = "a gzipped file" if content.startswith(GZIP) else what
         raise InvalidInputError(f"{path}: {what}; expected a UTF-8 text file") from error
 
 
@@ -167,6 +171,7 @@ def write_bytes_atomically(path: Path | str, content: bytes) -> None:
         BrokenPipeError: Whoever reads from a pipe has gone.
     """
     try:
+        path = os.fspath(path) or "."  # nothing stands for this folder
         descriptor = _descriptor_of(path)
         if descriptor is not None:
             _write_to_descriptor(descriptor, content)
@@ -192,6 +197,7 @@ def check_writable(path: Path | str) -> None:
     Called before long work, so that its result is not lost at the end.
     """
     try:
+        path = os.fspath(path) or "."  # nothing stands for this folder
         descriptor = _descriptor_of(path)
         status = _status(path) if descriptor is None else os.fstat(descriptor)
         if status is not None and stat.S_ISDIR(status.st_mode):

@@ -16,15 +16,15 @@ from typing import Final, NamedTuple
 from atg_fg.core.checks import brief, listed
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.object_sense import GREATEST_READING, MOST_OBJECT_SENSES, ObjectSense
-from atg_fg.core.recordings import RecordedLook, RecordedTrial, Recording
+from atg_fg.core.recordings import RecordedLook, RecordedTrial
 
 #: Columns that are no slots.
 FIXED: Final = ("trial", "step", "action", "object")
 _NEEDED: Final = FIXED[:3]
-_CONFIDENCE: Final = "confidence"
-_READING: Final = "reading"
+CONFIDENCE: Final = "confidence"
+READING: Final = "reading"
 #: Characters of a field; a longer one is no label.
-_LONGEST: Final = 1000
+LONGEST: Final = 1000
 #: Digits of a step.
 _LONGEST_STEP: Final = 18
 #: Faults that are kept of a file.
@@ -86,17 +86,23 @@ def columns_of(header: Sequence[str], slots: Sequence[str] | None = None) -> Csv
     Raises:
         InvalidInputError: A column is missing or repeated, or belongs to no slot.
     """
-    names = [name.strip() for name in header]
+    names = [_trimmed(name) for name in header]
     name, times = Counter(names).most_common(1)[0]
     if times > 1:
         raise InvalidInputError(f"line 1: column {brief(name)} is repeated; expected unique columns")
+    for name in names:
+        if not name or name[0] in ":=" or name[-1] in ":=":
+            raise InvalidInputError(f"line 1: column {brief(name)}; expected a name, SLOT:confidence or SLOT=LABEL")
     for needed in _NEEDED:
         if needed not in names:
             raise InvalidInputError(f"line 1: no column {needed!r} in {listed(names)}; expected {', '.join(_NEEDED)}")
     plain = [name for name in names if name not in FIXED and ":" not in name and "=" not in name]
     weighted = [name.partition("=")[0] for name in names if "=" in name]
-    lone = [name for name in plain if name != _CONFIDENCE]
-    if slots is None and _CONFIDENCE in plain and len(lone) == 1:
+    lone = [name for name in plain if name != CONFIDENCE]
+    if slots is None and CONFIDENCE in plain and lone:
+        if len(lone) > 1:
+            each = listed(f"{name}:{CONFIDENCE}" for name in lone)
+            raise InvalidInputError(f"line 1: column {CONFIDENCE!r}, and several slots; expected {each}")
         plain = lone
     owned = list(dict.fromkeys([*plain, *weighted]) if slots is None else slots)
     if not owned:
@@ -113,9 +119,9 @@ def columns_of(header: Sequence[str], slots: Sequence[str] | None = None) -> Csv
     readings = []
     for name, index in number.items():
         owner, colon, kind = name.partition(":")
-        if colon and kind == _READING and owner and "=" not in owner and owner not in owned:
+        if colon and kind == READING and owner and "=" not in owner and owner not in owned:
             readings.append((index, owner))
-        elif colon and "=" not in name and (kind != _CONFIDENCE or owner not in weights):
+        elif colon and "=" not in name and (kind != CONFIDENCE or owner not in weights):
             raise InvalidInputError(
                 f"line 1: column {brief(name)}; expected SLOT:confidence of a slot: {listed(owned)}; or SENSE:reading"
             )
@@ -124,11 +130,11 @@ def columns_of(header: Sequence[str], slots: Sequence[str] | None = None) -> Csv
             f"line 1: {len(readings)} columns of readings, {listed([name for _, name in readings])}; "
             f"expected at most {MOST_OBJECT_SENSES}"
         )
-    alone = number.get(_CONFIDENCE) if len(owned) == 1 and _CONFIDENCE not in owned else None
+    alone = number.get(CONFIDENCE) if len(owned) == 1 and CONFIDENCE not in owned else None
     return CsvColumns(
         tuple(owned),
         tuple(number.get(slot) for slot in owned),
-        tuple(number.get(f"{slot}:{_CONFIDENCE}", alone) for slot in owned),
+        tuple(number.get(f"{slot}:{CONFIDENCE}", alone) for slot in owned),
         tuple(tuple(weights[slot]) for slot in owned),
         tuple(readings),
         {name: number[name] for name in FIXED if name in number},
@@ -160,19 +166,24 @@ class CsvReader:
         senses: Sequence[ObjectSense | str] = (),
     ) -> None:
         lines = text.removeprefix("\ufeff")
-        first = lines.partition("\n")[0]
-        self._delimiter = max(",;\t", key=first.count)
-        self._csv = csv.reader(lines.split("\n"), delimiter=self._delimiter, strict=True)
+        self._delimiter = _delimiter_of(lines.partition("\n")[0])
+        # Line ends stay, for one in quotes belongs to a name.
+        self._csv = csv.reader((f"{line}\n" for line in lines.split("\n")), delimiter=self._delimiter, strict=True)
         self._rows = self._checked_rows()
         self._labels = None if labels is None else dict.fromkeys(sorted(labels))
         self._actions = None if actions is None else dict.fromkeys(sorted(actions))
         self._relative = {each.name for each in senses if isinstance(each, ObjectSense) and each.relative}
         self.faults: list[Fault] = []
         self._is_fatal = False
-        header = next(self._rows, None)
+        header = _without_empty_end(next(self._rows, []))
         if not header:
             raise InvalidInputError("line 1: empty; expected the names of the columns")
         self.columns = columns_of(header, slots)
+        for slot, weights in zip(self.columns.slots, self.columns.weights, strict=True):
+            for _, label in weights:
+                if labels is not None and label not in labels:
+                    expected = f"expected one of: {listed(sorted(labels))}"
+                    raise InvalidInputError(f"line 1, column {brief(f'{slot}={label}')}: {brief(label)}; {expected}")
         # Looks are few and repeat: one of each kind is kept.
         self._looks: dict[RecordedLook, RecordedLook] = {}
 
@@ -190,7 +201,8 @@ class CsvReader:
             seen.add(name)
             trials.append(self._trial(name, kept))
         if not trials:
-            raise InvalidInputError("line 2: no rows; expected at least one look")
+            fault = self.faults[0] if self.faults else "line 2: no rows; expected at least one look"
+            raise InvalidInputError(str(fault))
         return trials
 
     def _checked_rows(self) -> Iterator[list[str]]:
@@ -202,8 +214,10 @@ class CsvReader:
     def _numbered(self) -> Iterator[tuple[int, list[str]]]:
         for row in self._rows:
             line = self._csv.line_num
-            if not any(row):
+            if not any(map(str.strip, row)):
                 continue
+            if len(row) > self.columns.n_columns:
+                row = row[: self.columns.n_columns] + _without_empty_end(row[self.columns.n_columns :])
             if len(row) != self.columns.n_columns:
                 self._fault("columns", line, "", f"{len(row)} columns; expected {self.columns.n_columns}")
                 continue
@@ -220,10 +234,13 @@ class CsvReader:
                 actions.append(action)
             elif action:
                 self._fault("action at the end", line, "action", f"{brief(action)} and no look after it", fatal=False)
-        objects = list(dict.fromkeys(row[fixed["object"]].strip() for _, row in rows)) if "object" in fixed else [""]
+        # One row of a trial that says what it was of is as good as all.
+        named = [(line, row[fixed["object"]].strip()) for line, row in rows] if "object" in fixed else []
+        objects = list(dict.fromkeys(each for _, each in named if each))
         if len(objects) > 1:
-            self._fault("two objects", rows[0][0], "object", f"{brief(objects)} in a trial; expected one")
-        return RecordedTrial(name, tuple(looks), tuple(actions), objects[0] or None)
+            line = next(line for line, each in named if each == objects[1])
+            self._fault("two objects", line, "object", f"{brief(objects)} in a trial; expected one")
+        return RecordedTrial(name, tuple(looks), tuple(actions), objects[0] if objects else None)
 
     def _check_step(self, line: int, step: str, number: int, rows: list[tuple[int, list[str]]]) -> None:
         if not _is_step(step):
@@ -275,12 +292,12 @@ class CsvReader:
         if abs(value) <= GREATEST_READING and (value > 0 or not is_above):
             return value
         what = f"{brief(text)}; expected a number{' above 0' * is_above}"
-        self._fault("no reading", line, f"{name}:{_READING}", what)
+        self._fault("no reading", line, f"{name}:{READING}", what)
         return None
 
     def _known(self, line: int, slot: str, label: str) -> str | None:
-        if len(label) > _LONGEST:
-            self._fault("long label", line, slot, f"{len(label)} characters; expected at most {_LONGEST}")
+        if len(label) > LONGEST:
+            self._fault("long label", line, slot, f"{len(label)} characters; expected at most {LONGEST}")
             return None
         if self._labels is not None and label not in self._labels:
             self._fault("unknown label", line, slot, f"{brief(label)}; expected one of: {listed(self._labels)}")
@@ -291,7 +308,7 @@ class CsvReader:
         at = self.columns.confidence[index]
         if at is None or not row[at].strip():
             return None
-        name = f"{self.columns.slots[index]}:{_CONFIDENCE}"
+        name = f"{self.columns.slots[index]}:{CONFIDENCE}"
         value = self._number(line, name, row[at].strip(), 1.0)
         if not has_label:
             self._fault("confidence alone", line, name, f"{value} and no label; expected both or none", fatal=False)
@@ -308,7 +325,8 @@ class CsvReader:
 
     def _float(self, text: str) -> float:
         try:
-            return float(text.replace(",", ".") if self._delimiter != "," else text)
+            # Python takes 1_000 for a number, other programs do not.
+            return math.nan if "_" in text else float(text.replace(",", ".") if self._delimiter != "," else text)
         except ValueError:
             return math.nan
 
@@ -320,41 +338,27 @@ class CsvReader:
         self._is_fatal = self._is_fatal or fatal
 
 
-def write_csv(recording: Recording) -> str:
-    """Return trials as CSV: with confidences and the object where there are any, with weights by label if need be."""
-    slots, trials, senses = recording.slots, recording.trials, recording.sense_names
-    by_label = {
-        slot: sorted({name for trial in trials for look in trial.looks for name in _weights(look, index)})
-        for index, slot in enumerate(slots)
-    }
-    sure = any(value is not None for trial in trials for look in trial.looks for value in look.confidences)
-    named = any(trial.object is not None for trial in trials)
-    header = ["trial", "step", "action"]
-    for slot in slots:
-        header += [slot, *([f"{slot}:{_CONFIDENCE}"] if sure else []), *(f"{slot}={name}" for name in by_label[slot])]
-    lines = [header + [f"{name}:{_READING}" for name in senses] + (["object"] if named else [])]
-    for trial in trials:
-        for step, look in enumerate(trial.looks):
-            row = [trial.name, str(step), trial.actions[step] if step < len(trial.actions) else ""]
-            for index, slot in enumerate(slots):
-                row.append(look.labels[index] or "")
-                stated = look.confidences[index] if look.confidences else None
-                row += ["" if stated is None else repr(stated)] if sure else []
-                weights = _weights(look, index)
-                row += [repr(weights[name]) if name in weights else "" for name in by_label[slot]]
-            readings = dict(look.measured)
-            row += [repr(readings[name]) if name in readings else "" for name in senses]
-            lines.append(row + ([trial.object or ""] if named else []))
-    return "".join(f"{','.join(map(_quoted, line))}\n" for line in lines)
-
-
 def _is_step(text: str) -> bool:
     return text.isascii() and text.isdigit() and len(text) <= _LONGEST_STEP
 
 
-def _weights(look: RecordedLook, slot: int) -> dict[str, float]:
-    return dict(look.weights[slot] or {}) if look.weights else {}
+def _delimiter_of(header: str) -> str:
+    """Return what stands between the names of columns: they may hold others of these characters themselves."""
+
+    def likely(delimiter: str) -> tuple[int, int]:
+        names = {name.strip(' "') for name in header.split(delimiter)}
+        return len(names.intersection(FIXED)), header.count(delimiter)
+
+    return max(",;\t", key=likely)
 
 
-def _quoted(text: str) -> str:
-    return '"' + text.replace('"', '""') + '"' if set(text) & set(',;"\t\n\r') or text != text.strip() else text
+def _without_empty_end(row: list[str]) -> list[str]:
+    """Return a row without what separators at its end make of it."""
+    while row and not row[-1].strip():
+        row = row[:-1]
+    return row
+
+
+def _trimmed(name: str) -> str:
+    owner, equals, label = name.partition("=")
+    return f"{owner.strip()}{equals}{label.strip()}"

@@ -33,6 +33,8 @@ def oddities(recording: Recording) -> Iterator[Fault]:
             yield _odd("one look", f"trial {trial.name}", "no action; expected several looks")
         if not any(any(look.labels) or any(look.weights) for look in trial.looks):
             yield _odd("nothing seen", f"trial {trial.name}", "nothing in any look; expected a label")
+    if recording.exclusive:
+        yield from _repeated_labels(trials)
     yield from _still_actions(recording, used)
     soft = any(any(look.weights) for trial in trials for look in trial.looks)
     for slot, name in enumerate(recording.slots):
@@ -66,6 +68,15 @@ def _odd_readings(name: str, trials: Sequence[RecordedTrial]) -> Iterator[Fault]
                 yield _odd("far reading", f"trial {trial}, {place}", f"{far:g}; expected about {usual:g}")
         if np.std([np.median(each) for each in scaled.values()]) < _ERROR * error:
             yield _odd("useless readings", place, "differ in a trial as much as between trials; expected less")
+
+
+def _repeated_labels(trials: Iterable[RecordedTrial]) -> Iterator[Fault]:
+    """Yield the looks with a label in two slots, where each is in one only."""
+    for trial in trials:
+        for step, look in enumerate(trial.looks):
+            label, times = Counter(filter(None, look.labels)).most_common(1)[0] if any(look.labels) else ("", 0)
+            if times > 1:
+                yield Fault("repeated label", f"trial {trial.name}, look {step}", f"{label!r} twice; expected it once")
 
 
 def _odd(kind: str, place: str, what: str) -> Fault:

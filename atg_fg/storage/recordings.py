@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final, NamedTuple
 
-from atg_fg.core.checks import brief, listed, number, plain_text, whole_number
+from atg_fg.core.checks import brief, distinct_names, listed, number, plain_text, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.object_sense import GREATEST_READING, ObjectSense
 from atg_fg.core.patterns import Measured
@@ -20,7 +20,8 @@ from atg_fg.core.recordings import RecordedLook, RecordedTrial, Recording, sense
 from atg_fg.storage.checked_json import check_format, parse_json, read_list, read_object, without_none
 from atg_fg.storage.object_sense_json import read_object_senses, write_object_sense
 from atg_fg.storage.plain_files import read_text_file, write_bytes_atomically
-from atg_fg.storage.recording_csv import CsvReader, Fault, write_csv
+from atg_fg.storage.recording_csv import CsvReader, Fault
+from atg_fg.storage.recording_csv_writing import write_csv
 from atg_fg.storage.recording_oddities import oddities
 
 RECORDING_FORMAT: Final = "atg-fg/recording"
@@ -61,12 +62,9 @@ def read_spec(path: Path | str) -> RecordingSpec:
 
 
 def _spec(value: Any, place: str, keys: tuple[str, ...] = ()) -> RecordingSpec:
-    fields = read_object(value, place, keys, _KEYS)
+    fields = read_object(value, place, keys, tuple(key for key in _KEYS if key not in keys))
     names = {
-        key: tuple(
-            plain_text(name, f"{place}: {key}[{index}]")
-            for index, name in enumerate(read_list(fields[key], f"{place}: {key}"))
-        )
+        key: _names(read_list(fields[key], f"{place}: {key}"), f"{place}: {key}")
         for key in ("slots", "actions", "labels")
         if key in fields
     }
@@ -86,9 +84,18 @@ def _spec(value: Any, place: str, keys: tuple[str, ...] = ()) -> RecordingSpec:
 
 
 def _senses(value: Any, place: str) -> tuple[ObjectSense | str, ...]:
-    entries = read_list(value, place)
-    known = iter(read_object_senses([each for each in entries if not isinstance(each, str)], place))
-    return tuple(plain_text(each, place) if isinstance(each, str) else next(known) for each in entries)
+    senses = tuple(
+        plain_text(each, place) if isinstance(each, str) else read_object_senses([each], place)[0]
+        for each in read_list(value, place)
+    )
+    if senses:
+        distinct_names([each if isinstance(each, str) else each.name for each in senses], place)
+    return senses
+
+
+def _names(values: Sequence[Any], place: str) -> tuple[str, ...]:
+    """Return names, or raise ``InvalidInputError`` unless they are texts, at least one, all different."""
+    return distinct_names([plain_text(name, f"{place}[{index}]") for index, name in enumerate(values)], place)
 
 
 def merged_spec(*specs: RecordingSpec) -> RecordingSpec:
@@ -202,16 +209,13 @@ def _made(trials: Sequence[RecordedTrial], spec: RecordingSpec, labels: Sequence
 
 
 def _of_lines(text: str, place: str, spec: RecordingSpec) -> Recording:
-    lines = [line for line in text.removeprefix("\ufeff").split("\n") if line.strip()]
-    head = f"{place}: line 1"
-    header = parse_json(lines[0], head)
+    lines = enumerate(text.removeprefix("\ufeff").split("\n"), 1)
+    places = ((f"{place}: line {index}", line) for index, line in lines if line.strip())
+    head, first = next(places)
+    header = parse_json(first, head)
     if not isinstance(header, dict) or "format" not in header:
         raise InvalidInputError(f"{head}: {brief(header)}; expected a header with format {RECORDING_FORMAT!r}")
-    trials = (
-        (f"{place}: line {index}", parse_json(line, f"{place}: line {index}"))
-        for index, line in enumerate(lines[1:], 2)
-    )
-    return recording_of(header, head, trials, place, spec)
+    return recording_of(header, head, ((where, parse_json(line, where)) for where, line in places), place, spec)
 
 
 def recording_of(
@@ -288,7 +292,7 @@ def _read_look(value: Any, sure: Any, slots: tuple[str, ...], place: str, spec: 
         where = f"{place}, slot {slot!r}"
         given = entry if isinstance(entry, dict) else {} if entry is None else {plain_text(entry, where): 1.0}
         for label, weight in given.items():
-            number(weight, f"{where}: {label}", 0.0)
+            number(weight, f"{where}: {plain_text(label, where)}", 0.0)
             if spec.labels is not None and label not in spec.labels:
                 raise InvalidInputError(f"{where}: {brief(label)}; expected one of: {listed(spec.labels)}")
         if isinstance(entry, dict) and not any(given.values()):

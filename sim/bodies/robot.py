@@ -11,11 +11,11 @@ import numpy as np
 import pybullet
 
 from atg_fg.core.patterns import FloatArray
+from atg_fg.core.silence import silenced
 from sim.bodies.cube import CUBE_CENTRE
 from sim.bodies.prepared_robot import PreparedRobot, shell
 from sim.bodies.rail import Rail, on_rail
 from sim.bodies.robot_model import BASE
-from sim.simulator import silenced
 
 #: Links no more joints apart than this cannot hit each other; their shapes overlap at the joint.
 _NEIGHBOURS: Final = 3

@@ -177,3 +177,8 @@ def test_table1_takes_a_policy_of_ones_own(run, refused, tmp_path, monkeypatch):
     assert status == 0
     assert json.loads(output)["parameters"]["policy"] == "own_agent:Agent"
     assert "policy 'own_agent:nobody': own_agent has no 'nobody'" in refused(*arguments, "--policy", "own_agent:nobody")
+
+
+@pytest.mark.parametrize("command", ["table1", "figure3", "ablation"])
+def test_more_tests_than_anyone_can_wait_for_are_refused_at_once(refused, command):
+    assert "'--tests'" in refused(command, "--tests", "1000000000")

@@ -241,3 +241,63 @@ def test_an_action_that_never_changes_anything_is_warned_of(run, folder):
     arguments = ("learn", "still.csv", "--memory", "m.json", "--teach", "--objects", "3", "--preset", "default")
     (warning,) = document(run, *arguments)["warnings"]
     assert warning == "still.csv: 'tip' never changes what is seen; expected it to, at times"
+
+
+@pytest.mark.parametrize("memory", ["robot.db", "robot.json"])
+def test_of_recordings_that_cannot_all_be_taught_none_is(run, refused, folder, memory):
+    (folder / "unnamed.csv").write_text((folder / "second.csv").read_text().replace("box-2", ""))
+    teach = ("--teach", "--preset", "default")
+    for files in (["first.csv", "unnamed.csv"], ["unnamed.csv"]):
+        message = refused("learn", *files, "--memory", memory, "--objects", "3", *teach)
+        assert "unnamed.csv: trial t0: no object; expected one, to be taught" in message
+        assert not (folder / memory).exists()
+    run("learn", "first.csv", "--memory", memory, "--objects", "3", *teach)
+    before = load_memory(memory)
+    (folder / "twice.jsonl").write_text(
+        '{"format": "atg-fg/recording", "version": 1, "slots": ["label"]}\n'
+        '{"trial": "a", "object": "new", "actions": ["tip"], "looks": [["new"], ["logo"]]}\n'
+        '{"trial": "b", "object": "new", "actions": ["tip"], "looks": [["new"], ["logo"]], '
+        '"measured": [{"weight": 1}, null]}\n'
+    )
+    assert "readings of 'weight'" in refused("learn", "twice.jsonl", "--memory", memory, *teach)
+    after = load_memory(memory)
+    assert (after.assumptions, after.names) == (before.assumptions, before.names)
+
+
+def test_labels_that_cannot_be_seen_at_once_are_found_before_anything_is_learned(run, refused, folder):
+    rows = "trial,step,action,front,top\na,0,tip,x,y\na,1,,y,x\nb,0,tip,x,y\nb,1,,x,x\n"
+    (folder / "two.csv").write_text(rows)
+    message = refused("learn", "two.csv", "--memory", "m.db", "--objects", "2", "--exclusive")
+    assert "two.csv: trial b, step 1: detection, slot 'top': symbol 0 is repeated" in message
+    assert not (folder / "m.db").exists()
+    run("recordings", "convert", "two.csv", "-o", "two.jsonl", "--exclusive")
+    status, output, _ = run("recordings", "check", "two.jsonl")
+    assert status == 1
+    assert "fault, repeated label: trial b, look 1: 'x' twice; expected it once" in output
+
+
+def test_what_a_file_cannot_hold_is_said_before_the_work(refused, folder, monkeypatch):
+    monkeypatch.setattr("atg_fg.experiments.recorded_trials.learn", None)
+    assert "m.npz: merges or a learned structure" in refused(
+        "learn", "first.csv", "--memory", "m.npz", "--objects", "3"
+    )
+    assert "is a folder" in refused("learn", "first.csv", "--memory", "m.db", "--objects", "3", "--json", "")
+
+
+def test_trials_whose_object_is_not_told_are_left_out_of_the_score(run, folder):
+    run("learn", "first.csv", "--memory", "robot.db", "--teach", "--objects", "3", "--preset", "default")
+    rows = (folder / "second.csv").read_text()
+    whole = document(run, "recognise", "second.csv", "--memory", "robot.db", "--preset", "default")
+    (folder / "part.csv").write_text(rows.replace("box-2", ""))
+    found = document(run, "recognise", "part.csv", "--memory", "robot.db", "--preset", "default")
+    known = [trial["right"] for trial in whole["trials"] if trial["object"] != "box-2"]
+    assert [trial["right"] for trial in found["trials"] if trial["object"] is not None] == known
+    assert {trial["right"] for trial in found["trials"] if trial["object"] is None} == {None}
+    assert (found["score"]["success"]["count"], found["score"]["success"]["of"]) == (sum(known), len(known))
+
+
+def test_a_number_of_objects_other_than_the_memory_s_is_warned_of(run, folder):
+    run("learn", "first.csv", "--memory", "robot.db", "--teach", "--objects", "3", "--preset", "default")
+    arguments = ("recognise", "second.csv", "--memory", "robot.db", "--objects", "5", "--preset", "default")
+    (warning,) = document(run, *arguments)["warnings"]
+    assert warning == "second.csv: 5 objects; the memory was begun for 3, which counts"

@@ -1,5 +1,7 @@
 import os
+import struct
 import time
+import zlib
 
 import cv2
 import numpy as np
@@ -157,6 +159,14 @@ def test_an_image_that_would_unfold_to_gigabytes_is_refused(tmp_path):
         read_image(tmp_path / "huge.png")
     with FrameSource("images", tmp_path) as frames, pytest.raises(CameraError, match=r"huge\.png"):
         list(frames)
+
+
+def test_image_codecs_do_not_speak_in_the_place_of_the_error(tmp_path, capfd):
+    head = b"\x89PNG\r\n\x1a\n" + struct.pack(">I4sIIBBBBB", 13, b"IHDR", 2**31 - 1, 2**31 - 1, 8, 0, 0, 0, 0)
+    (tmp_path / "vast.png").write_bytes(head + struct.pack(">I", zlib.crc32(head[12:])))
+    with pytest.raises(InvalidInputError, match=r"vast\.png: cannot be read"):
+        read_image(tmp_path / "vast.png")
+    assert capfd.readouterr() == ("", "")
 
 
 def test_an_image_is_read_as_rgb(tmp_path):

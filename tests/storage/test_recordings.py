@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.object_sense import ObjectSense
 from atg_fg.core.recordings import RecordedLook, RecordedTrial, Recording, used_labels
-from atg_fg.storage.recording_csv import MOST_FAULTS
+from atg_fg.storage.recording_csv import MOST_FAULTS, CsvReader
+from atg_fg.storage.recording_csv_writing import write_csv
 from atg_fg.storage.recordings import (
     RecordingSpec,
     check_recording,
@@ -64,7 +65,11 @@ def written(tmp_path):
         .replace("0;25", "0,25"),
         PLAIN.replace(",", "\t"),
         PLAIN.replace("logo", '"logo"').replace("a,1", " a , 1 "),
-        PLAIN.replace("\nb,0", "\n\nb,0"),
+        PLAIN.replace("\nb,0", "\n\n , ,\nb,0"),
+        PLAIN.replace("\n", ",,\n"),
+        PLAIN.replace("\n", ",\n").replace("object,", "object", 1),
+        PLAIN.replace("0.5,cup", "0.5,").replace(",,,cup", ",,,"),
+        PLAIN.encode("utf-16"),
         gzip.compress(PLAIN.encode()),
     ],
 )
@@ -76,6 +81,20 @@ def test_a_table_is_read_however_it_was_written(written, text):
         ("rotate", "tip"),
         ("base", "logo", "text"),
     )
+
+
+@pytest.mark.parametrize("label", ["lo\ngo", "a,b;c\td", '"', "007", "nan", "None", "NA", "#", "=", "a:b", "\x1b[31m"])
+def test_a_label_is_what_stands_there_whatever_it_looks_like(written, tmp_path, label):
+    text = PLAIN.replace("logo", '"' + label.replace('"', '""') + '"')
+    recording = read_recording(written(text.replace("\n", "\r\n")))
+    assert recording.trials[0].looks[0].labels == (label,)
+    write_recording(recording, tmp_path / "again.csv")
+    assert read_recording(tmp_path / "again.csv").trials == recording.trials
+
+
+def test_names_of_columns_may_hold_other_separators(written):
+    text = PLAIN.replace(",", ";").replace("label", '"a,b,c,d,e,f,g"', 1).replace("label:", '"a,b,c,d,e,f,g":', 1)
+    assert read_recording(written(text.replace('":confidence', ':confidence"'))).slots == ("a,b,c,d,e,f,g",)
 
 
 def test_columns_say_what_they_are(written):
@@ -171,7 +190,7 @@ def test_a_spec_says_what_rows_do_not(written):
         read_recording(written(PLAIN)).assumptions()
 
 
-labels = st.text(st.characters(exclude_categories=("Cs", "Cc", "Zl", "Zp")), min_size=1, max_size=5).map(str.strip)
+labels = st.text(st.characters(exclude_categories=("Cs",), exclude_characters="\r"), max_size=5).map(str.strip)
 names = labels.filter(lambda text: text and not text.startswith("\ufeff"))
 
 
@@ -213,12 +232,50 @@ def test_whole_likelihoods_go_there_and_back(tmp_path):
         assert [each.labels for each in found.looks] == [(None, "b")] * 2
 
 
+NAMES = ("x", "trial", "step", "object", "confidence", "a:b", "a=b", "x:reading", " x", "x ", "x\ry", "x" * 1001, "=")
+
+
+@pytest.mark.parametrize("part", ["slot", "label", "weighted", "action", "object", "sense", "trial"])
+def test_a_table_holds_names_as_they_are_or_is_refused(part):
+    refused = []
+    for name in NAMES:
+
+        def of(which, usual, name=name):
+            return name if part == which else usual
+
+        weights = {of("weighted", "b"): 0.5, "c": 0.5}
+        measured = ((of("sense", "weight"), 1.0),)
+        look = RecordedLook((of("label", "a"), None), (0.5, None), (None, weights), measured)
+        slots, action = (of("slot", "front"), "top"), of("action", "go")
+        trial = RecordedTrial(of("trial", "t"), (look, look), (action,), of("object", "cup"))
+        recording = Recording(slots, (action,), tuple(used_labels([trial])), (trial,), senses=(of("sense", "weight"),))
+        try:
+            reader = CsvReader(write_csv(recording))
+        except InvalidInputError as error:
+            assert str(error).endswith(".jsonl")  # noqa: PT017
+            refused.append(name)
+            continue
+        assert reader.columns.slots == slots
+        assert reader.trials() == [trial]
+        assert not reader.faults
+    assert "x" not in refused
+    if part in ("label", "action", "object", "trial"):
+        assert refused == [" x", "x ", "x\ry", "x" * 1001]
+
+
 @pytest.mark.parametrize(
     ("change", "message"),
     [
         (("action,", "deed,"), "line 1: no column 'action' in trial, step, deed"),
         (("label:confidence", "lable:confidence"), "line 1: column 'lable:confidence'; expected SLOT:confidence"),
         (("label:confidence", "label"), "line 1: column 'label' is repeated"),
+        (("trial", ",trial"), "line 1: column ''; expected a name"),
+        (("label:confidence", "side="), "line 1: column 'side='; expected a name"),
+        (("label:confidence", "=logo"), "line 1: column '=logo'; expected a name"),
+        (("label:confidence", "side= a,side=a"), "line 1: column 'side=a' is repeated"),
+        (("label:confidence", "side,confidence"), "'confidence', and several slots; expected label:conf.*, side:conf"),
+        (("0.5", "0_5"), "line 3, column 'label:confidence': '0_5'; expected a number from 0 to 1"),
+        (("a,2,,,,cup", "a,2,,,,cup,more"), "line 4: 7 columns; expected 6"),
         (("a,1,", "a,3,"), "line 3, column 'step': 3; expected 1, one more than before"),
         (("a,1,", "a,0,"), "line 3, column 'step': 0; expected 1"),
         (("a,1,", "a,one,"), "line 3, column 'step': 'one'; expected a whole number"),
@@ -227,7 +284,7 @@ def test_whole_likelihoods_go_there_and_back(tmp_path):
         (("0.5", "nan"), "line 3, column 'label:confidence': 'nan'; expected a number from 0 to 1"),
         (("0.5", "sure"), "line 3, column 'label:confidence': 'sure'; expected a number"),
         (("a,1,tip", "a,1,"), "line 3, column 'action': empty; expected what was done before the next look"),
-        (("0.25,box", "0.25,bag"), r"line 5, column 'object': \['bag', 'box'\] in a trial; expected one"),
+        (("0.25,box", "0.25,bag"), r"line 6, column 'object': \['bag', 'box'\] in a trial; expected one"),
         (("a,1,tip,text", "a,1,tip,text,more"), "line 3: 7 columns; expected 6"),
         (("a,0,rotate", ",0,rotate"), "line 2, column 'trial': empty; expected the name of a trial"),
         (("logo", "x" * 1001), "line 2, column 'label': 1001 characters; expected at most 1000"),
@@ -245,7 +302,15 @@ def test_a_fault_is_one_line_that_says_where_and_what_was_expected(written, chan
         ("", "line 1: empty; expected the names of the columns"),
         ("trial,step,action,label\n", "line 2: no rows; expected at least one look"),
         ("trial,step,action\n0,0,\n", "line 1: no slot in trial, step, action"),
-        (b"trial,step,action,label\n0,0,,\xff\n", "not UTF-8"),
+        (b"trial,step,action,label\n0,0,,\xff\n", "line 2: byte 0xff, not UTF-8; expected a UTF-8 text file"),
+        ("trial,step,action,label\n0,0,\n", "line 2: 3 columns; expected 4"),
+        ('\n\n{"format": "other"}', "line 3: format: 'other'"),
+        ('{"format": "atg-fg/recording", "version": 1, "slots": []}', "slots: .*; expected at least one name"),
+        ('{"format": "atg-fg/recording", "version": 1, "slots": ["a", "a"]}', "slots: .*all different"),
+        ('{"format": "atg-fg/recording", "version": 1, "slots": ["a"], "labels": ["b", "b"]}', "labels: .*different"),
+        ('{"format": "atg-fg/recording", "version": 1, "slots": ["a"], "actions": ["b", "b"]}', "actions: .*different"),
+        ('{"format": "atg-fg/recording", "version": 1, "slots": ["a"], "senses": ["b", "b"]}', "senses: .*different"),
+        ('{"format": "atg-fg/recording", "version": 1, "slots": ["a"], "senses": ["b", 3]}', "senses.*: 3; expected"),
         ("{", "line 1: not valid JSON"),
         ('{"format": "other"}', "format: 'other'; expected 'atg-fg/recording'"),
         ('{"format": "atg-fg/recording", "version": 1, "slots": ["a"]}', "line 1: no trials after it"),
@@ -265,6 +330,8 @@ def test_what_is_no_recording_is_refused(written, text, message):
         ({"trial": 0, "actions": [], "looks": [[3]]}, "look 0, slot 'label': 3; expected a text"),
         ({"trial": 0, "actions": [], "looks": [[{"x": -1}]]}, "look 0, slot 'label': x: -1; expected"),
         ({"trial": 0, "actions": [], "looks": [[{"x": 0}]]}, "expected a likelihood above 0"),
+        ({"trial": 0, "actions": [], "looks": [[{"": 1}]]}, "look 0, slot 'label': ''; expected a text"),
+        ({"trial": 0, "actions": [], "looks": [[{"\ud800": 1}]]}, "expected a text of whole characters"),
         ({"trial": 0, "actions": [], "looks": [["x"]], "confidences": [[2]]}, "look 0: confidences: 2; expected"),
         ({"trial": 0, "actions": [], "looks": [["x"]], "more": 1}, "unknown key 'more'"),
         ({"trial": 0, "actions": [], "looks": [["x"]], "measured": []}, "measured: 0 entries; expected 1"),
@@ -283,6 +350,27 @@ def test_a_faulty_line_is_named(written, line, message):
     header = {"format": "atg-fg/recording", "version": 1, "slots": ["label"]}
     with pytest.raises(InvalidInputError, match=f"line 2.*{message}"):
         read_recording(written(f"{json.dumps(header)}\n{json.dumps(line)}\n", "looks.jsonl"))
+    with pytest.raises(InvalidInputError, match=f"line 4.*{message}"):
+        read_recording(written(f"{json.dumps(header)}\n\n\n{json.dumps(line)}\n", "looks.jsonl"))
+
+
+def test_a_closed_alphabet_closes_likelihoods_too(written):
+    text = "trial,step,action,side=a,side=b\nt,0,go,1,0\nt,1,,0,1\n"
+    with pytest.raises(InvalidInputError, match="line 1, column 'side=b': 'b'; expected one of: a"):
+        read_recording(written(text), RecordingSpec(labels=("a",)))
+
+
+@pytest.mark.parametrize("scale", [5e-324, 1e-300, 1e-20, 1e20, 1e308])
+def test_likelihoods_of_any_scale_are_the_same_evidence(written, scale):
+    """A detector of many pixels gives tiny ones; only their ratios count."""
+    text = "trial,step,action,front=a,front=b,top=a,top=b\nt,0,,{0!r},{0!r},{0!r},{1!r}\n"
+    looks = []
+    for at in (1.0, scale):
+        recording = read_recording(written(text.format(at, at / 2)))
+        looks.append(recording.trials[0].looks[0].evidence(recording.assumptions(2)).likelihood)
+    expected = [1.0, 0.5, 1.0, 0.5] if scale > 5e-324 else [1.0, 0.0, 1.0, 0.0]
+    assert looks[0] == pytest.approx([1.0, 0.5, 1.0, 0.5])
+    assert looks[1] / looks[1].max() == pytest.approx(expected)
 
 
 ODD = "trial,step,action,label,confidence,object\n" + "".join(

@@ -3,7 +3,7 @@ import os
 
 import pytest
 
-from sim.simulator import silenced
+from atg_fg.core.silence import silenced
 
 
 @pytest.mark.parametrize("stream", [1, 2])
