@@ -214,8 +214,8 @@ for weight in (False, True):
     print(f"{'camera and weight' if weight else 'camera':17}: {result.success[0]} of {result.success[1]} right")
 
 # %% [markdown]
-# Two boxes that look the same, as the robot felt them: what it believes of one of them after a look, and after it was
-# lifted.
+# Two boxes that look the same, as the robot felt them: what it believes of one of them after a look that fits both, and
+# after it was lifted.
 
 # %%
 options = {"look_alikes": 0.5, "differ_in": "weight", "weight": True}
@@ -231,9 +231,8 @@ for number, box in enumerate((first, second)):
 
 # %%
 inference = atg.begin_trial("bayes-filter", alike, parameters)
-record = run_trial(
-    felt, inference, atg.make_policy("entropy"), 3, np.random.default_rng(9), reset_options={"object": first}
-)
+presented = {"object": first, "orientation": 0}
+record = run_trial(felt, inference, atg.make_policy("entropy"), 3, np.random.default_rng(9), reset_options=presented)
 print("kg:", [round(float(boxes.weights[box]), 2) for box in (first, second)])
 for step in record.steps:
     believed = dict(zip(record.names, step.belief.objects.round(3).tolist(), strict=True))
