@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import ast
+import os
 import signal
 import threading
 from collections.abc import Callable
 from importlib import import_module
 from importlib.abc import InspectLoader
 from importlib.util import find_spec
+from types import FrameType
 from typing import Any
 
 import typer
@@ -46,7 +48,7 @@ class LazyCommand(TyperCommand):
         """Hand over to the command itself; from now on Ctrl-C is ``KeyboardInterrupt`` to it."""
         command = self.load()
         if callable(signal.getsignal(signal.SIGINT)) and threading.current_thread() is threading.main_thread():
-            signal.signal(signal.SIGINT, signal.default_int_handler)
+            signal.signal(signal.SIGINT, _interrupt)
         return command.make_context(*arguments, **options)
 
 
@@ -59,6 +61,18 @@ class LazyGroup(TyperGroup):
             if isinstance(command, LazyCommand):
                 command.read_help()
         super().format_help(ctx, formatter)
+
+
+def _interrupt(signal_number: int, frame: FrameType | None) -> None:
+    """Answer Ctrl-C with ``KeyboardInterrupt``, but leave at once where a library is being loaded.
+
+    Commands load libraries when they need them, and libraries turn the exception into errors of their own.
+    """
+    while frame is not None:
+        if frame.f_code.co_filename == "<frozen importlib._bootstrap>":
+            os._exit(130)
+        frame = frame.f_back
+    raise KeyboardInterrupt
 
 
 def _guarded(command: Any) -> Any:

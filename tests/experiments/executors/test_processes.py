@@ -3,6 +3,7 @@
 import multiprocessing.util
 import os
 import signal
+import socket
 import threading
 from contextlib import closing
 
@@ -21,6 +22,9 @@ def interrupted_spawning(monkeypatch):
     asleep = threading.Event()
     thread = threading.Thread(target=asleep.wait)
     thread.start()
+    noticed, tell = socket.socketpair()
+    tell.setblocking(False)
+    before = signal.set_wakeup_fd(tell.fileno())
     spawn, begun = multiprocessing.util.spawnv_passfds, []
 
     def spawn_interrupted(path, arguments, descriptors):
@@ -30,12 +34,16 @@ def interrupted_spawning(monkeypatch):
             # One alone: another could come after the test. It is blocked in this thread, so another one takes it.
             if len(begun) == 1:
                 signal.pthread_kill(thread.ident, signal.SIGINT)
+                noticed.recv(1)  # the other thread may be slow to take it, and the test would be over by then
         return process
 
     monkeypatch.setattr(multiprocessing.util, "spawnv_passfds", spawn_interrupted)
     yield begun
+    signal.set_wakeup_fd(before)
     asleep.set()
     thread.join()
+    for end in (noticed, tell):
+        end.close()
 
 
 def has_ended(process):
