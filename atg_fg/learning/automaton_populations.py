@@ -29,14 +29,15 @@ AUTOMATON_SWEEPS: Final = 12
 AUTOMATON_TEMPERATURE: Final = 2.0
 #: Sweeps where objects may have their own automata.
 OWN_SWEEPS: Final = 8
-#: A population that is so many nats behind its rival, after so many trials, is given up.
-RIVAL_BEHIND: Final = 12.0
-RIVAL_TRIALS: Final = 10
+#: A population that is so many nats behind its rival, after so many trials, is given up. Before that the better one may
+#: be far behind: an automaton has more to learn than register maps.
+RIVAL_BEHIND: Final = 20.0
+RIVAL_TRIALS: Final = 20
 #: Sweeps of a chain that is made anew, and how hot it begins.
 RESTART_SWEEPS: Final = 40
 RESTART_HOTTEST: Final = 0.1
-#: States of an automaton beyond |G|; states that are not needed cost nothing. At least, and at most, so many.
-SPARE_STATES: Final = 2
+#: An automaton has |G| states, but at least, and at most, so many. States that are not needed cost nothing by
+#: themselves, but with more of them chains find the right ones less often.
 LEAST_STATES: Final = 8
 MOST_STATES: Final = 12
 
@@ -55,7 +56,7 @@ class AutomatonPopulation(Population):
     def __init__(self, n_aspects: int, n_slots: int, n_actions: int, n_symbols: int, *, may_own: bool = False) -> None:
         super().__init__()
         self._may_own = may_own
-        self._n_states = min(max(n_aspects + SPARE_STATES, LEAST_STATES), MOST_STATES)
+        self._n_states = min(max(n_aspects, LEAST_STATES), MOST_STATES)
         self._n_slots, self._n_actions, self._n_symbols = n_slots, n_actions, n_symbols
 
     def advance(self, task: Task, names: IntArray, rng: np.random.Generator) -> Conclusion:
@@ -140,13 +141,13 @@ class RivalPopulations(Population):
     behind is given up.
 
     Args:
-        rivals: Two or more; saved chains know them by their number.
+        rivals: Two or more, each with ln of its prior weight; saved chains know them by their number.
     """
 
-    def __init__(self, *rivals: Population) -> None:
+    def __init__(self, *rivals: tuple[Population, float]) -> None:
         super().__init__()
-        self._rivals = rivals
-        self._log_evidence = [0.0] * len(rivals)
+        self._rivals = [population for population, _ in rivals]
+        self._log_evidence = [log_prior for _, log_prior in rivals]
 
     def advance(self, task: Task, names: IntArray, rng: np.random.Generator) -> Conclusion:
         """Take in the last trial of a task."""

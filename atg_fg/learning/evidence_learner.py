@@ -24,6 +24,8 @@ MOST_WRONG: Final = 0.3
 NOVEL: Final = 0.5
 #: Classes of structure that are rivals where there is one slot.
 MOST_RIVALS: Final = 3
+#: ln of the prior weight of the other classes beside an automaton that all objects share, where there is one slot.
+EXCEPTION: Final = -4.0
 #: Chains of less weight are not followed through a trial.
 LEAST_WEIGHT: Final = 1e-3
 
@@ -282,8 +284,11 @@ class EvidenceLearner:
         n_slots = len(alphabet.slots)
         if n_slots == 1 and not alphabet.exclusive:
             sizes = (self.assumptions.n_aspects, n_slots, n_actions, alphabet.n_symbols)
-            automata = AutomatonPopulation(*sizes), AutomatonPopulation(*sizes, may_own=True)
-            return RivalPopulations(*automata, RegisterPopulation(n_slots, n_actions, alphabet.n_symbols))
+            return RivalPopulations(
+                (AutomatonPopulation(*sizes), 0.0),
+                (AutomatonPopulation(*sizes, may_own=True), EXCEPTION),
+                (RegisterPopulation(n_slots, n_actions, alphabet.n_symbols), EXCEPTION),
+            )
         return RegisterPopulation(n_slots, n_actions, alphabet.n_symbols)
 
     def _task(self, trials: Sequence[RawTrial], noise: DetectorNoise) -> Task:
