@@ -5,7 +5,7 @@ Run with ``python benchmarks/appearance.py [TESTS [WORLD [METHOD]]]``. Tests of 
 same as another one; and ``meshes``. The methods, all of them if none is named:
 
 * ``nearest`` neighbour: an object is the one that a remembered look is nearest to, or new if that is too far; the
-  threshold is the one that does best on these very tests. Of the last look alone, or of all looks of a trial on average;
+  threshold is the one that does best on these very tests. Of the last look, or of all looks of a trial on average;
 * a ``bag`` of looks: classes found as usual, preset ``default``, but actions say nothing (α so large that all aspects
   follow alike);
 * a ``fixed`` codebook: classes of the looks of other boxes or things, preset ``default``;
