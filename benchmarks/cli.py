@@ -46,7 +46,6 @@ def bench(
 
     Example: atg-fg bench --sizes 10,100 --json bench.json
     """
-    options.check_json_option(json_file)
     page = None if markdown is None else _page(markdown)
     document = _measured(_plan(quick, sizes, rounds, tests), against) if given is None else _read(given)
     made = _tables(document, given)

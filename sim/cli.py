@@ -44,9 +44,11 @@ def reliability(
 
     Example: atg-fg sim reliability --condition worn --actions 200 --json worn.json
     """
-    from sim.reliability import summarise
+    from sim.reliability import ACTIONS_A_TRIAL, run_actions, summarise
 
-    runs = _run(condition, actions, stations, pictures, seed, urdf, jobs, json_file)
+    with options.progress_bar("trials", -(-actions // ACTIONS_A_TRIAL)) as advance:
+        n_jobs = jobs or options.available_cpus()
+        runs = run_actions(condition, actions, seed, n_jobs, urdf, advance, stations, pictures)
     summary = summarise(runs)
     parameters = {"condition": condition, "actions": actions, "seed": seed}
     if stations > 1:
@@ -63,9 +65,11 @@ def reliability(
 @app.command()
 def calibrate(
     files: Annotated[list[Path], typer.Argument(help="What sim reliability --json wrote.", show_default=False)],
-    output: Annotated[Path, typer.Option(writable=True, help="Preset file to write; --preset takes it.")] = Path(
-        "robot.json"
-    ),
+    output: Annotated[
+        Path,
+        typer.Option(writable=True, help="Preset file to write; --preset takes it."),
+        plain_files.check_writable,
+    ] = Path("robot.json"),
     json_file: options.JsonFile = None,
 ) -> None:
     """Estimate the noise of actions and looks from reliability runs, and write the preset that assumes as much.
@@ -75,8 +79,6 @@ def calibrate(
     from sim.noise_calibration import calibrate as estimate
     from sim.noise_calibration import read_counts
 
-    options.check_json_option(json_file)
-    plain_files.check_writable(output)
     counts = read_counts(files)
     parameters, missing_rate = estimate(counts)
     command = f"atg-fg sim calibrate {' '.join(map(str, files))}"
@@ -143,25 +145,6 @@ def webcam(
     for number, (cube, turns) in enumerate(film_cubes(tags, output, calibration, trials, actions, seed)):
         say(f"trial {number}: cube {cube + 1}, turned {', '.join(turns) or 'not at all'}")
     say(f"saved: {output}, {calibration}")
-
-
-def _run(
-    condition: str,
-    actions: int,
-    stations: int,
-    pictures: bool,
-    seed: int,
-    urdf: Path | None,
-    jobs: int | None,
-    json_file: str | None,
-) -> list[Any]:
-    """Check the options and run the actions, with a progress bar."""
-    from sim.reliability import ACTIONS_A_TRIAL, run_actions
-
-    options.check_json_option(json_file)
-    with options.progress_bar("trials", -(-actions // ACTIONS_A_TRIAL)) as advance:
-        n_jobs = jobs or options.available_cpus()
-        return run_actions(condition, actions, seed, n_jobs, urdf, advance, stations, pictures)
 
 
 def _reliability_table(title: str, summary: dict[str, Any]) -> Table:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Annotated
 
 import typer
@@ -14,7 +13,6 @@ from atg_fg.display import figures
 from atg_fg.display.success_plots import plot_ablation
 from atg_fg.experiments.ablation import NOISES, VARIANTS, AblationLog, Cell, run_ablation, summarise_ablation
 from atg_fg.experiments.document_tables import tables_of
-from atg_fg.storage import plain_files
 from atg_fg.worlds.registry import WORLDS
 
 
@@ -32,18 +30,13 @@ def ablation(
     executor: options.Executor = "process",
     log: options.Log = None,
     json_file: options.JsonFile = None,
-    plot: Annotated[
-        Path | None, typer.Option(writable=True, help="Draw the curves into this .png, .svg or .pdf file.")
-    ] = None,
+    plot: options.Plot = None,
 ) -> None:
     """Compare the literal model, learning within the trial, learned structure and lookahead, with and without noise.
 
     Example: atg-fg ablation --actions 4,10 --noises ideal --tests 2 --log ablation.jsonl
     """
     workers = options.check_executor_option(executor, jobs)
-    options.check_json_option(json_file)
-    if plot is not None:
-        figures.check_figure_path(plot)
     cells = [
         Cell(variant, world, noise, number)
         for world in _chosen("--worlds", worlds, tuple(WORLDS), ",")
@@ -51,10 +44,7 @@ def ablation(
         for variant in _chosen("--variants", variants, tuple(VARIANTS), ";")
         for number in parse_actions(actions)
     ]
-    kept = None
-    if log is not None:
-        plain_files.check_writable(log)
-        kept = AblationLog(log, trials)
+    kept = None if log is None else AblationLog(log, trials)
     with options.progress_bar("trials", len(cells) * tests * trials) as advance:
         seeds = range(seed, seed + tests)
         results = run_ablation(cells, seeds, trials, kept, workers, advance, executor)

@@ -44,17 +44,17 @@ def calibrate(
     square: Square = 35.0,
     tag: BoardTag = 26.0,
     dictionary: BoardDictionary = "5X5_50",
-    output: Annotated[Path, typer.Option("--output", "-o", writable=True, help="Calibration to write, JSON.")] = Path(
-        "camera.json"
-    ),
+    output: Annotated[
+        Path,
+        typer.Option("--output", "-o", writable=True, help="Calibration to write, JSON."),
+        plain_files.check_writable,
+    ] = Path("camera.json"),
     json_file: options.JsonFile = None,
 ) -> None:
     """Measure a camera and its lens from pictures of a board (OpenCV's ChArUco), such as print board makes.
 
     Example: atg-fg camera calibrate board-1.jpg board-2.jpg board-3.jpg board-4.jpg board-5.jpg -o camera.json
     """
-    options.check_json_option(json_file)
-    plain_files.check_writable(output)
     from atg_fg.senses.camera_calibration import CalibrationBoard
     from atg_fg.senses.camera_calibration import calibrate as measure
     from atg_fg.storage.camera_files import write_calibration

@@ -54,7 +54,6 @@ def demo(
     Example: atg-fg demo --seed 1 --novel
     """
     world = told_world(world)
-    options.check_json_option(json_file)
     parameters = preset_named(preset)
     engine = options.engine_of(engine, parameters, "gtsam")
     figures.figure_class()  # fails now rather than at the end, if matplotlib is not installed

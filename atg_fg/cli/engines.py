@@ -49,17 +49,12 @@ def compare(
     missing: options.Missing = 0.0,
     seed: options.Seed = 0,
     json_file: options.JsonFile = None,
-    plot: Annotated[
-        Path | None, typer.Option(writable=True, help="Draw error against time into this .png, .svg or .pdf file.")
-    ] = None,
+    plot: options.Plot = None,
 ) -> None:
     """Compare inference engines on the same trials: error against exact, decisions, and cost.
 
     Example: atg-fg engines compare --trials 10 --engines "bayes-filter,particle(n_particles=500)"
     """
-    options.check_json_option(json_file)
-    if plot is not None:
-        figures.check_figure_path(plot)
     names = list(ENGINES) if engines == "all" else named_engines(engines)
     for name in names:
         if (bare := name_and_options(name)[0]) not in ENGINES and ":" not in bare:
@@ -121,7 +116,6 @@ def check(
 
     Example: atg-fg engines check --engine bayes-filter --trials 500
     """
-    options.check_json_option(json_file)
     engine_for(engine)
     plan = replace(calibration.PLAN, n_trials=trials)
     with options.progress_bar("trials", trials) as advance:

@@ -100,8 +100,6 @@ def table1(
     Example: atg-fg table1 --preset paper --engine bayes-filter
     """
     workers = options.check_executor_option(executor, jobs)
-    options.check_entropy_option(settled)
-    options.check_json_option(json_file)
     if resume and records is None:
         raise InvalidInputError("--resume: no records to go on from; expected --records with their folder")
     if crops:
@@ -229,11 +227,11 @@ def figure3(
     json_file: options.JsonFile = None,
     log: options.Log = None,
     csv_file: Annotated[
-        Path | None, typer.Option("--csv", writable=True, help="Write the points as CSV to this file.")
+        Path | None,
+        typer.Option("--csv", writable=True, help="Write the points as CSV to this file."),
+        plain_files.check_writable,
     ] = None,
-    plot: Annotated[
-        Path | None, typer.Option(writable=True, help="Draw the figure into this .png, .svg or .pdf file.")
-    ] = None,
+    plot: options.Plot = None,
 ) -> None:
     """Run the paper's Figure 3: success of the entropy and the random policy by number of actions.
 
@@ -241,12 +239,6 @@ def figure3(
     """
     numbers = parse_actions(actions)
     workers = options.check_executor_option(executor, jobs)
-    options.check_json_option(json_file)
-    # Before the long run, so that its result is not lost.
-    if csv_file is not None:
-        plain_files.check_writable(csv_file)
-    if plot is not None:
-        figures.check_figure_path(plot)
     model = preset_named(preset)
     engine = options.engine_of(engine, model, "bayes-filter")
     plan = TestPlan(
@@ -256,10 +248,7 @@ def figure3(
         parameters=model,
         n_trials=trials,
     )
-    kept = None
-    if log is not None:
-        plain_files.check_writable(log)
-        kept = Figure3Log(log, plan)
+    kept = None if log is None else Figure3Log(log, plan)
     seeds = range(seed, seed + tests)
     with options.progress_bar("trials", len(numbers) * len(FIGURE3_POLICIES) * tests * trials) as advance:
         points = figure3_points(plan, numbers, FIGURE3_POLICIES, seeds, workers, advance, kept, executor)

@@ -45,7 +45,6 @@ def explain(
 
     Example: atg-fg explain tests/data/scripted_trial.json --k 3 --smooth
     """
-    options.check_json_option(json_file)
     if memory is not None and samples:
         raise InvalidInputError("--samples: none are drawn over kinds of objects; expected it without --memory")
     script = read_script(plain_files.read_text_file(file), str(file))

@@ -101,7 +101,6 @@ def goal(
     Example: atg-fg goal --cubes 3 --memory-cubes 20 --trials 50 --engine bayes-filter
     """
     workers = options.check_executor_option(executor, jobs)
-    options.check_json_option(json_file)
     if resume and records is None:
         raise InvalidInputError("--resume: no records to go on from; expected --records with their folder")
     if video is not None:

@@ -112,7 +112,6 @@ def live(
     given = [(kind, name) for kind, name in sources if name is not None]
     if len(given) != 1:
         raise InvalidInputError(f"live: {len(given)} sources of frames; expected one of --camera, --video and --images")
-    options.check_json_option(json_file)
     # A video may be an address, so that it is no path to the check that all commands share.
     for option, output in (("--json", json_file), ("--memory", memory)):
         if video is not None and output is not None and same_file(Path(output), Path(video)):

@@ -49,7 +49,6 @@ def look(
 
     Example: atg-fg look photograph.jpg --dictionary DICT_6X6_250 --draw seen
     """
-    options.check_json_option(json_file)
     known = tags_of(tags, dictionary, tag_size)
     if draw is not None:
         _check_drawings(draw, images)

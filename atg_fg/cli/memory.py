@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.table import Table
 
 from atg_fg.cli import memory_compact, memory_duplicates, memory_files, options, structure
 from atg_fg.cli.terminal import say
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
+from atg_fg.core.table import Table
 from atg_fg.storage import plain_files
 from atg_fg.storage.checked_json import parse_json
 from atg_fg.storage.compact_file import is_compact
@@ -46,7 +46,6 @@ def show(file: options.MemoryFile, json_file: options.JsonFile = None) -> None:
 
     Example: atg-fg memory show memory.json
     """
-    options.check_json_option(json_file)
     records = _records(file) if is_database(file) else {}
     memory = None if is_database_without_memory(file) else load_memory(file)
     document: dict[str, Any] = {"command": "memory show"}
@@ -78,12 +77,8 @@ def _rows(memory: RobotMemory) -> list[dict[str, Any]]:
 
 
 def _print_objects(title: str, rows: list[dict[str, Any]]) -> None:
-    table = Table(title=title, title_justify="left")
-    for heading in ("object", "aspects", "unobserved", "edges", "transitions seen", "unknown edges"):
-        table.add_column(heading, justify="left" if heading == "object" else "right")
-    for row in rows:
-        table.add_row(*map(str, row.values()))
-    options.console().print(table)
+    headings = ("object", "aspects", "unobserved", "edges", "transitions seen", "unknown edges")
+    options.print_tables([Table(title, headings, tuple(tuple(map(str, row.values())) for row in rows))])
 
 
 def _records(file: Path) -> dict[str, Any]:
@@ -115,7 +110,6 @@ def check(file: options.MemoryFile, json_file: options.JsonFile = None) -> int:
 
     Example: atg-fg memory check robot.db
     """
-    options.check_json_option(json_file)
     with plain_files.readable_again(file) as there:
         return _check(there, json_file)
 
@@ -145,7 +139,6 @@ def repair(
 
     Example: atg-fg memory repair robot.db
     """
-    options.check_json_option(json_file)
     faults = repair_database(file)
     options.write_json({"command": "memory repair", "faults": faults}, json_file)
     if json_file != "-":

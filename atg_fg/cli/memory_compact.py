@@ -24,7 +24,6 @@ def compact(
 
     Example: atg-fg memory compact memory.json --output memory.npz
     """
-    options.check_json_option(json_file)
     if not is_compact(output):
         raise InvalidInputError(f"--output: {str(output)!r}; expected a name that ends in {SUFFIX}")
     plain_files.check_writable(output)

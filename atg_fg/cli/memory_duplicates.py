@@ -38,7 +38,6 @@ def duplicates(
 
     Example: atg-fg memory duplicates memory.json --merge
     """
-    options.check_json_option(json_file)
     with _changed(file) if merge else nullcontext(memory_files.load_memory(file)) as memory:
         usual = "learned" if isinstance(memory, StructuredMemory) else "default"
         parameters = preset_named(preset or usual)

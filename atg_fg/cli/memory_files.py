@@ -145,7 +145,6 @@ def merge(
 
     Example: atg-fg memory merge robot.db other.json -o both.db
     """
-    options.check_json_option(json_file)
     plain_files.check_writable(output)
     if os.path.exists(output):
         raise InvalidInputError(f"{output}: is already there; expected the path of a new file")
@@ -188,7 +187,6 @@ def diff(
 
     Example: atg-fg memory diff before.json robot.db
     """
-    options.check_json_option(json_file)
     found = difference(load_memory(first), load_memory(second))
     options.write_json({"command": "memory diff", "same": not found, "difference": found}, json_file)
     if json_file != "-":

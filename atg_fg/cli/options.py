@@ -19,6 +19,7 @@ from atg_fg.cli.terminal import PlainConsole
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.table import Table
+from atg_fg.display import figures
 from atg_fg.engines import ENGINES, usual_engine
 from atg_fg.experiments.executors.base import EXECUTORS, check_executor, is_cluster
 from atg_fg.policies import POLICIES, check_entropy_threshold
@@ -31,6 +32,10 @@ from atg_fg.worlds.registry import ARCUBE_WORLDS, WORLDS
 def available_cpus() -> int:
     """Return the number of processors this process may use."""
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+def _checked_entropy(settled: Any) -> Any:
+    return None if settled is None else check_entropy_threshold(settled, "--settled")
 
 
 #: Panels of the help page; what is in none of them stands in the first one, without a name.
@@ -73,6 +78,7 @@ Settled = Annotated[
     typer.Option(
         help="End a trial when the entropy of the verdict is at most this, nats; --actions is then the most.",
         rich_help_panel=TRIALS,
+        callback=_checked_entropy,
     ),
 ]
 Seed = Annotated[int, typer.Option(min=0, help="Seed; test number k uses seed + k.", rich_help_panel=TRIALS)]
@@ -100,9 +106,17 @@ Log = Annotated[
         help="Keep each test in this .jsonl file as it ends, and leave out those in it.",
         rich_help_panel=RUNNING,
     ),
+    plain_files.check_writable,
 ]
 JsonFile = Annotated[
-    str | None, typer.Option("--json", writable=True, help="Write the result as JSON to this file, or - to print it.")
+    str | None,
+    typer.Option("--json", writable=True, help="Write the result as JSON to this file, or - to print it."),
+    plain_files.check_writable,
+]
+Plot = Annotated[
+    Path | None,
+    typer.Option(writable=True, help="Draw the result into this .png, .svg or .pdf file."),
+    figures.check_figure_path,
 ]
 Slip = Annotated[
     float, typer.Option(help="Probability that an action fails and the object stays as it is.", rich_help_panel=WORLD)
@@ -180,18 +194,6 @@ def check_executor_option(executor: str, jobs: int | None) -> int:
     return jobs or available_cpus()
 
 
-def check_entropy_option(settled: float | None) -> None:
-    """Refuse ``--settled`` if it is given and no finite entropy above 0."""
-    if settled is not None:
-        check_entropy_threshold(settled, "--settled")
-
-
-def check_json_option(path: str | None) -> None:
-    """Refuse a JSON path that cannot be written, before any work is done."""
-    if path not in (None, "-"):
-        plain_files.check_writable(str(path))
-
-
 def write_json(document: dict[str, Any], path: str | None) -> None:
     """Write a result to ``path``, or print it if that is ``-``."""
     if path is None:
@@ -211,7 +213,7 @@ def console(json_path: str | None = None) -> PlainConsole:
 def print_tables(tables: Iterable[Table], *titles: str) -> None:
     """Print tables on standard output, the first ones with other titles if any are given."""
     for table, title in zip_longest(tables, titles):
-        shown = rich.table.Table(title=title or table.title, title_justify="left", caption=table.note or None)
+        shown = rich.table.Table(title=title or table.title or None, title_justify="left", caption=table.note or None)
         for number, heading in enumerate(table.headings):
             shown.add_column(heading, justify="right" if number else "left")
         for row in table.rows:

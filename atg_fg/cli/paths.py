@@ -1,7 +1,8 @@
-"""No command writes over a file that it reads, or writes twice to one: refused before any work is done.
+"""No command writes over a file that it reads, writes twice to one, or works for what cannot be written in the end.
 
-An option or argument of type ``Path`` is read, unless ``typer.Option(writable=True)`` says that it is written to. So
-this is done once, for all commands, from how they are declared.
+An option or argument of type ``Path`` is read, unless ``typer.Option(writable=True)`` says that it is written to. What
+refuses a path that cannot be written, such as ``check_writable``, stands beside the option, as one more annotation of
+the parameter. So this is done once, for all commands, from how they are declared.
 """
 
 from __future__ import annotations
@@ -45,10 +46,12 @@ class Parameter(NamedTuple):
     Attributes:
         name: In the command's function.
         written: Whether the command writes to it.
+        check: Refuses a path that cannot be written; ``None`` if the command sees to that itself.
     """
 
     name: str
     written: bool
+    check: Callable[[str], object] | None = None
 
 
 class _Given(NamedTuple):
@@ -67,7 +70,8 @@ def parameters_of(command: Callable[..., Any]) -> list[Parameter]:
         kind, *extras = get_args(hint)
         written = any(isinstance(extra, ParameterInfo) and extra.writable for extra in extras)
         if written or _is_path(kind) or name == "preset":
-            found.append(Parameter(name, written))
+            checks = [extra for extra in extras if not isinstance(extra, ParameterInfo)]
+            found.append(Parameter(name, written, *checks))
     return found
 
 
@@ -76,7 +80,7 @@ def _is_path(kind: Any) -> bool:
 
 
 def guarded(command: Callable[..., Any], label: Callable[[str], str]) -> Callable[..., Any]:
-    """Return a command's function that first refuses an output over an input, or over another output.
+    """Return a command's function that first refuses an output over an input or another output, or that has no place.
 
     Args:
         command: The function.
@@ -94,6 +98,9 @@ def guarded(command: Callable[..., Any], label: Callable[[str], str]) -> Callabl
                     f"{label(output.parameter.name)}: {output.path} is the file of {label(spared.parameter.name)} too, "
                     "and would be overwritten; expected another file"
                 )
+        for each in paths:
+            if each.parameter.check is not None:
+                each.parameter.check(str(each.path))
         return command(**given)
 
     return checked

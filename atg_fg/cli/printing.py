@@ -45,7 +45,6 @@ def cube(
 
     Example: atg-fg print cube --tags 0-11 --cubes 3 -o cubes.pdf
     """
-    options.check_json_option(json_file)
     for name, length in (("--side", side), ("--tag-size", tag_size)):
         if length is not None and not 1 <= length <= 2000:
             raise InvalidInputError(f"{name}: {length}; expected 1 to 2000 mm")

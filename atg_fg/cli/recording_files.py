@@ -38,7 +38,6 @@ def check(
 
     Example: atg-fg recordings check looks.csv --objects 8
     """
-    options.check_json_option(json_file)
     recording, faults = check_recording(file, given_spec(spec, slots, actions, labels, objects, None, None))
     names_of = {
         "slots": list(recording.slots),

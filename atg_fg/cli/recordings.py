@@ -84,7 +84,6 @@ def learn(
 
     Example: atg-fg learn looks.csv --memory robot.db --objects 8
     """
-    options.check_json_option(json_file)
     parameters = preset_named(preset)
     chosen = options.engine_of(engine, parameters, "bayes-filter")
     engine_for(chosen, parameters)
@@ -128,7 +127,6 @@ def recognise(
 
     Example: atg-fg recognise new.csv --memory robot.db --report page.html
     """
-    options.check_json_option(json_file)
     write_page = None
     if report is not None:
         plain_files.check_writable(report)

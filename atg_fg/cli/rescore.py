@@ -28,7 +28,6 @@ def rescore(
 
     Example: atg-fg rescore results/robonaut/nominal_default/test-0000.jsonl.gz --preset learned
     """
-    options.check_json_option(json_file)
     parameters = preset_named(preset)
     engine = options.engine_of(engine, parameters, "bayes-filter")
     engine_for(engine, parameters)

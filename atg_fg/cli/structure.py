@@ -9,11 +9,11 @@ from pathlib import Path
 from typing import Annotated, Any
 
 import typer
-from rich.table import Table
 
 from atg_fg.cli import options
 from atg_fg.cli.terminal import say
 from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.table import Table
 from atg_fg.display import figures
 from atg_fg.display.completed_picture import draw_completed_atg, probability_text
 from atg_fg.display.structure_picture import draw_structure
@@ -35,6 +35,7 @@ def structure(
             writable=True,
             help="Draw the structure, or the completed ATG of --object, into this .png, .svg or .pdf file.",
         ),
+        figures.check_figure_path,
     ] = None,
     json_file: options.JsonFile = None,
 ) -> None:
@@ -42,9 +43,6 @@ def structure(
 
     Example: atg-fg memory structure memory.json --plot structure.png
     """
-    options.check_json_option(json_file)
-    if plot is not None:
-        figures.check_figure_path(plot)
     memory = memory_files.load_memory(file)
     learned = memory if isinstance(memory, StructuredMemory) else None
     believed = learned.learner.believed(learned.names) if learned is not None else []
@@ -212,10 +210,9 @@ def _tell(file: Path, document: dict[str, Any]) -> None:
         )
     rates = ", ".join(f"{name} {value:.4f}" for name, value in document["rates"].items())
     console.print(f"rates: {rates}")
-    table = Table()
-    for heading in ("object", "follows it", "observed", "predicted", "unknown"):
-        table.add_column(heading, justify="left" if heading == "object" else "right")
-    for row in document["objects"]:
-        numbers = (str(row[status]) for status in ("observed", "predicted", "unknown"))
-        table.add_row(row["name"], probability_text(row["follows"]), *numbers)
-    console.print(table)
+    kinds = ("observed", "predicted", "unknown")
+    rows = (
+        (row["name"], probability_text(row["follows"]), *(str(row[kind]) for kind in kinds))
+        for row in document["objects"]
+    )
+    options.print_tables([Table("", ("object", "follows it", *kinds), tuple(rows))])

@@ -49,10 +49,14 @@ def trial(
         Path | None, typer.Option(help="Memory file (JSON, .db or .npz) to start from; empty if not given.")
     ] = None,
     save_memory: Annotated[
-        Path | None, typer.Option(writable=True, help="Save the memory with what was learned to this file.")
+        Path | None,
+        typer.Option(writable=True, help="Save the memory with what was learned to this file."),
+        plain_files.check_writable,
     ] = None,
     record: Annotated[
-        Path | None, typer.Option(writable=True, help="Write the trial's record as JSON lines to this file.")
+        Path | None,
+        typer.Option(writable=True, help="Write the trial's record as JSON lines to this file."),
+        plain_files.check_writable,
     ] = None,
     frames: Annotated[
         bool, typer.Option("--frames", help="Save what the camera sees at each look in a folder beside the record.")
@@ -72,11 +76,6 @@ def trial(
 
     Example: atg-fg trial --memory robot.db --save-memory robot.db --seed 3
     """
-    options.check_entropy_option(settled)
-    options.check_json_option(json_file)
-    for path in (save_memory, record):
-        if path is not None:
-            plain_files.check_writable(path)
     if frames and record is None:
         raise InvalidInputError("--frames: no record to keep them with; expected --record FILE")
     chosen_policy = make_policy(policy, settled)

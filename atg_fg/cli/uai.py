@@ -47,7 +47,6 @@ def solve(
     """
     if task not in TASKS:
         raise InvalidInputError(f"--task: {task!r}; expected one of: {', '.join(TASKS)}")
-    options.check_json_option(json_file)
     read = read_model(plain_files.read_text_file(model), str(model), _note)
     observed: dict[int, int] = {}
     if evidence is not None:
@@ -94,15 +93,19 @@ TASKS: dict[str, Callable[[DiscreteModel, dict[int, int], int], _Answer]] = {
 @app.command()
 def export(
     script: Annotated[Path, typer.Argument(help="A scripted trial (JSON).", show_default=False)],
-    model: Annotated[Path, typer.Option(writable=True, help="Write the trial's factor graph to this file.")],
-    evidence: Annotated[Path, typer.Option(writable=True, help="Write what was seen to this file.")],
+    model: Annotated[
+        Path,
+        typer.Option(writable=True, help="Write the trial's factor graph to this file."),
+        plain_files.check_writable,
+    ],
+    evidence: Annotated[
+        Path, typer.Option(writable=True, help="Write what was seen to this file."), plain_files.check_writable
+    ],
 ) -> None:
     """Write the factor graph of a scripted trial and its evidence in the UAI format.
 
     Example: atg-fg uai export trial.json --model trial.uai --evidence trial.uai.evid
     """
-    for path in (model, evidence):
-        plain_files.check_writable(path)
     exported = export_trial(read_script(plain_files.read_text_file(script), str(script)))
     plain_files.write_bytes_atomically(model, write_model(exported.model).encode())
     plain_files.write_bytes_atomically(evidence, write_evidence(exported.evidence).encode())
