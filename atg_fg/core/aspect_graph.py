@@ -37,7 +37,7 @@ class AspectTransitionGraph:
     Attributes:
         name: The object's name, unique in a memory.
         assumptions: What is taken for granted of every object.
-        revision: A number that is another one after each change; graphs of one revision, as a copy, know the same.
+        revision: A number that changes with the graph; graphs of one revision, as a graph and its copy, know the same.
     """
 
     def __init__(self, name: str, assumptions: Assumptions) -> None:
@@ -68,7 +68,7 @@ class AspectTransitionGraph:
             self.add_moments(name, senses[name].moments_of([reading]))
 
     def add_moments(self, name: str, moments: Moments) -> None:
-        """Add what is kept of some readings of a sense; none of them is no entry."""
+        """Add what is kept of some readings of a sense; no readings make no entry."""
         if moments.count:
             self._measured[name] = self._measured.get(name, Moments()).plus(moments)
             self.revision = next(_revisions)
@@ -80,7 +80,7 @@ class AspectTransitionGraph:
 
     @property
     def n_unobserved(self) -> int:
-        """M = |G| − n, the size of the collection node; 0 when the node has ceased to be."""
+        """M = |G| − n, the size of the collection node; 0 once every aspect is known."""
         return self.assumptions.n_aspects - self.n_known
 
     @property

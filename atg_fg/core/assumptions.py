@@ -48,7 +48,7 @@ class Assumptions:
         object.__setattr__(self, "object_senses", senses)
 
     def extends(self, other: Assumptions) -> bool:
-        """Return whether these are the other ones, perhaps with labels more that its open alphabet did not know."""
+        """Return whether these are the other assumptions, perhaps with labels added to their open alphabet."""
         ours, theirs = (
             (
                 each.n_objects,

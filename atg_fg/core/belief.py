@@ -44,7 +44,7 @@ class IdentityBelief:
 
     @classmethod
     def uniform(cls, n_objects: int, n_unseen: int) -> IdentityBelief:
-        """Return the belief that each of ``n_objects`` remembered and ``n_unseen`` other objects is as probable."""
+        """Return the belief in which ``n_objects`` remembered and ``n_unseen`` other objects are equally probable."""
         return cls.of(np.append(np.ones(n_objects), n_unseen) / (n_objects + n_unseen), n_unseen)
 
     @property

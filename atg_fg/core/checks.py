@@ -1,4 +1,4 @@
-"""Values that come from users and files, checked: each function names the place of what is not as it should be."""
+"""Checks of values that come from users and files; each error names the place, the value and what was expected."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def number(
         place: Named in the error.
         least: Lower bound.
         most: Upper bound.
-        below: Upper bound that is no longer allowed itself.
+        below: Upper bound that is itself not allowed.
         slack: How far rounding may have carried it past a bound.
     """
     try:

@@ -45,7 +45,7 @@ class MissingDependencyError(AtgError, ImportError):
 
 
 class WorkerLostError(AtgError, RuntimeError):
-    """Work whose worker died, and again when it was run again."""
+    """Work that was given up because every worker that ran it died."""
 
 
 def unknown_name(kind: str, name: object, known: Iterable[object]) -> UnknownNameError:

@@ -214,7 +214,7 @@ class RobotMemory(Persistent):
         self._rename_shared(old, new)
 
     def _rename_shared(self, old: str, new: str) -> None:
-        """Let what all objects share know of another name."""
+        """Give an object another name in what all objects share."""
 
     def _free_name(self, name: str | None) -> str:
         """Return a name for a new ATG: the one that is wanted, if it is free."""
@@ -244,7 +244,7 @@ class RobotMemory(Persistent):
 
         Args:
             keep: Name of an ATG, which the merged one has.
-            drop: Name of another one, which is no more.
+            drop: Name of another one, which ceases to exist.
 
         Raises:
             UnknownNameError: There is no such ATG.
@@ -289,11 +289,11 @@ class RobotMemory(Persistent):
         self._unmerge_shared(merge)
 
     def _merge_shared(self, keep: str, drop: str) -> tuple[int, ...]:
-        """Let what all objects share know of a merge; return the numbers of the raw trials that were of ``drop``."""
+        """Merge two objects in what all objects share; return the numbers of the raw trials that were of ``drop``."""
         return ()
 
     def _unmerge_shared(self, merge: Merge) -> None:
-        """Let what all objects share know that a merge was undone."""
+        """Undo a merge in what all objects share, too."""
 
     def extended(self, labels: Iterable[str]) -> RobotMemory:
         """Return a memory of the same whose open alphabet has these labels, too; itself if it has them all.
@@ -325,7 +325,7 @@ class RobotMemory(Persistent):
         return RobotMemory(assumptions, graphs, merges, self._sense_copied())
 
     def become(self, other: RobotMemory) -> None:
-        """Have the assumptions, ATGs and merges of another memory instead of one's own."""
+        """Replace the assumptions, ATGs and merges by those of another memory."""
         self.assumptions = other.assumptions
         self._graphs, self._merges, self.sense = dict(other._graphs), list(other._merges), other.sense
 

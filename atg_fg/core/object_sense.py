@@ -32,7 +32,7 @@ _GUESSED: Final = 4.0
 #: How many times as much objects differ as readings err, if readings do not say, and how many times at most then.
 _DIFFERENT: Final = 5.0
 _SURELY: Final = 50.0
-#: Standard deviation between objects, of the logarithm, that is taken for granted at least.
+#: Least standard deviation between objects, of the logarithm.
 _LEAST_SPREAD: Final = 0.3
 
 
@@ -114,7 +114,7 @@ class ObjectSense:
 
         Errors are relative if all readings are above 0. Readings err by as much as they differ in a trial: worth few of
         them, so that what is learned corrects it. Trials may all be of one object, so objects are taken to differ by
-        some times as much at least.
+        at least a few times as much.
         """
         groups = [list(each) for each in trials if len(each)]
         relative = all(value > 0 for each in groups for value in each)

@@ -10,7 +10,7 @@ _STEERING: Final = re.compile("[\0-\x1f\x7f-\x9f\u061c\u200b\u200e\u200f\u2028-\
 
 
 def visible(text: str, keep: str = "") -> str:
-    r"""Return a text with each character that is no sign written out, such as ``\x1b``.
+    r"""Return a text with each invisible character written out, such as ``\x1b``.
 
     Args:
         text: Anything, such as the name of an object in a file from somewhere.

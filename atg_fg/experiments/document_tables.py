@@ -10,7 +10,7 @@ from atg_fg.core.table import Table
 
 SUCCESS: Final = "success, %"
 ACTIONS: Final = "actions a trial"
-#: That a plot has room for.
+#: Actions a trial that a plot has room for.
 _MOST_ACTIONS: Final = 10**6
 
 #: Rates of the goal experiment by their names in its result, with what a reader calls them.
@@ -37,7 +37,7 @@ def tables_of(document: Mapping[str, Any]) -> list[Table]:
     """Return the tables of a result whose ``command`` is one of ``TABLES``.
 
     Raises:
-        InvalidInputError: A rate or a count is none.
+        InvalidInputError: Something that should be a rate or a count is none.
         KeyError, IndexError, TypeError, ValueError, AttributeError, ZeroDivisionError: It is no such result.
     """
     return TABLES[str(document["command"])](document)

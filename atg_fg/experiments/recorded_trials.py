@@ -114,7 +114,7 @@ def learn(
 
 
 def _raw(trial: RecordedTrial, memory: RobotMemory, place: str) -> RawTrial | None:
-    """Return what a memory learns from a trial, ``None`` if that is nothing."""
+    """Return what a memory learns from a trial, ``None`` if there is nothing to learn."""
     looks = _evidence(trial, memory.assumptions, place)
     actions = _actions(trial, memory)
     record = TrialRecord.from_looks(memory.assumptions, looks, actions)
@@ -122,7 +122,7 @@ def _raw(trial: RecordedTrial, memory: RobotMemory, place: str) -> RawTrial | No
 
 
 def teach(recording: Recording, memory: RobotMemory, on_trial: Callable[[], None] | None = None) -> int:
-    """Learn from each trial as one of the object that the recording names; return from how many there was to learn.
+    """Learn from each trial as one of the object that the recording names; return from how many something was learned.
 
     Raises:
         InvalidInputError: A trial names no object; nothing was learned then.
@@ -216,7 +216,7 @@ def _count(count: int, of: int) -> dict[str, Any]:
 def names_by_majority(found: Sequence[Recognised], made_from: dict[str, object]) -> dict[str, object]:
     """Return the object that each ATG is taken for: the one of its name, else of most trials that were matched to it.
 
-    An ATG that was learned without being told what it is of says nothing itself of the truth.
+    The name of an ATG that was not taught says nothing of the truth.
     """
     votes: dict[str, Counter[object]] = {}
     for each in found:

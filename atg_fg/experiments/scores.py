@@ -134,7 +134,7 @@ class Score:
         if not isinstance(memory, StructuredMemory) or not memory.reassignments:
             return None
         owners = memory.learner.owners
-        # Trials from before this test are not ours to judge.
+        # Trials from before this test are not scored here.
         return owners if len(owners) == len(self._learned_from) + n_new else None
 
     def name_of(self, presented: object) -> str | None:

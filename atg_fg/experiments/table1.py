@@ -54,7 +54,7 @@ class TestPlan:
         n_actions: Actions a trial; the most, if trials end when the verdict is settled.
         n_trials: Trials a test.
         n_objects: |O|, unless a user's own world says another in its assumptions.
-        settled: Entropy of the verdict in nats at which a trial ends; ``None`` if none ends for that.
+        settled: Entropy of the verdict in nats at which a trial ends; ``None`` if no trial ends early.
     """
 
     __test__ = False  # the paper calls it a test; pytest should not collect it

@@ -53,7 +53,7 @@ def components_of(model: RecognitionModel, belief: FloatArray) -> list[BeliefCom
 
 
 def shown_patterns_of(model: RecognitionModel, belief: FloatArray, evidence: Evidence) -> FloatArray:
-    """Return the probability of each pattern to be the one that the object shows now, shape [|𝒵|].
+    """Return the probability that the object shows each pattern now, shape [|𝒵|].
 
     Args:
         model: The tables in force.

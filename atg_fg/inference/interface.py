@@ -73,7 +73,7 @@ class Inference(ABC):
     name: ClassVar[str]
     exact: ClassVar[bool]
     knows_structure: ClassVar[bool] = False
-    #: Whether ``act`` takes what is only probable.
+    #: Whether ``act`` takes actions that are only probable.
     takes_uncertain_actions: ClassVar[bool] = True
     #: The engine's own options that ``begin_trial`` was given.
     options: Mapping[str, Any] = MappingProxyType({})
@@ -160,7 +160,7 @@ class Inference(ABC):
         vars(self).update(vars(again))
 
     def _look_again(self, evidence: Evidence) -> None:
-        """Take in a look at what was looked at before: nothing happened since."""
+        """Take in another look at the same aspect: nothing has happened since the last one."""
         before = copy(self)
         self.history.actions.append(NOTHING)
         try:
@@ -171,7 +171,7 @@ class Inference(ABC):
             raise
 
     def _keep_the_strongest(self, evidence: Evidence) -> None:
-        """Let a look count in place of those at rest if it says more; they are taken back by beginning again."""
+        """Replace the looks at rest by this one if it says more; the trial is begun again without them."""
         rest = self.history.looks_at_rest()
         if max(strength(self.history.evidence[time]) for time in rest) >= strength(evidence):
             return
@@ -259,7 +259,7 @@ class Inference(ABC):
         return components_of(self.model, self.aspect_belief)
 
     def shown_patterns(self) -> FloatArray:
-        """Return the probability of each pattern to be the one shown now, given all evidence, shape [|𝒵|].
+        """Return the probability that each pattern is shown now, given all evidence, shape [|𝒵|].
 
         Raises:
             InvalidInputError: Asked before a look or between an action and its look.

@@ -17,7 +17,7 @@ class Agent(Protocol):
     """The part of a model of Stable-Baselines3 that is needed here."""
 
     def predict(self, observation: Any, *, deterministic: bool) -> tuple[Any, Any]:
-        """Return the action for an observation, and a state, which is ``None`` of an agent without one."""
+        """Return the action for an observation, and a state, which is ``None`` for an agent without one."""
 
 
 class AgentPolicy:

@@ -16,8 +16,8 @@ class Choice(NamedTuple):
 
     Attributes:
         action: Index of the chosen action; ``None`` ends the trial.
-        expected_entropies: Of each action in nats, shape [A], if the policy looked at them; of a policy that looks
-            several actions ahead, after as many of them.
+        expected_entropies: Of each action in nats, shape [A], if the policy looked at them; if the policy looks
+            several actions ahead, those after that many actions.
         purpose: What the action is for, or why the trial ends, if the policy has more than one.
     """
 

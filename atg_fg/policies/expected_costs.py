@@ -32,7 +32,7 @@ class ExpectedCosts(NamedTuple):
 
     @property
     def share_with_a_path(self) -> float:
-        """Probability to be at an aspect from which some action leads on."""
+        """Probability that the object is at an aspect from which some action leads on."""
         return sum(each for aspect, each in self.belief.items() if np.isfinite(self.costs[aspect]).any())
 
 
@@ -44,7 +44,7 @@ def by_component(
 
 
 def share_with_a_path(components: Sequence[ExpectedCosts]) -> float:
-    """Return the share of all probability that is where some action leads on."""
+    """Return the probability that the object is where some action leads on."""
     total = sum(component.probability for component in components)
     led_on = sum(component.probability * component.share_with_a_path for component in components)
     return led_on / total if total > 0 else 0.0

@@ -13,7 +13,7 @@ from atg_fg.policies.shortest_paths import exploration_costs
 
 
 class ExplorationPolicy:
-    """Goes to the nearest aspect with an action that was never tried there, as far as it is known, and tries it."""
+    """Goes to the nearest known aspect with an action that was never tried there, and tries it."""
 
     name: ClassVar[str] = "explore"
 

@@ -1,4 +1,4 @@
-"""Arrays that grow at their end: what an array as long as a list costs, without its objects."""
+"""Arrays that grow at their end, as lists do, without an object for each number."""
 
 from __future__ import annotations
 

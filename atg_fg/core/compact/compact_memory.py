@@ -45,8 +45,8 @@ class GraphArrays(NamedTuple):
 class CompactMemory(RobotMemory):
     """A robot memory whose ATGs are made when they are asked for, from arrays of small whole numbers.
 
-    An ATG that grows is written once more at the end; the places left behind are freed when they are half of all. So to
-    add or extend an ATG costs what the ATG is long, on average.
+    An ATG that grows is written anew at the end; the places left behind are freed when they are half of all. So adding
+    or extending an ATG takes time proportional to its size, on average.
 
     Args:
         assumptions: |O|, |G|, actions and alphabet.
@@ -226,7 +226,7 @@ class CompactMemory(RobotMemory):
         return CompactMemory.of(super()._under(assumptions, labels))
 
     def become(self, other: RobotMemory) -> None:
-        """Have the assumptions and ATGs of another memory instead of one's own."""
+        """Replace the assumptions and ATGs by those of another memory."""
         self.assumptions, arrays = other.assumptions, CompactMemory.of(other).arrays()
         self._fill(other.names, arrays)
 

@@ -66,7 +66,7 @@ class SizeClasses:
         self._count(patterns, 1)
 
     def remove(self, patterns: Sequence[int]) -> None:
-        """Count an object that showed these patterns no more."""
+        """Stop counting an object that showed these patterns."""
         self._count(patterns, -1)
 
     def _count(self, patterns: Sequence[int], change: int) -> None:

@@ -23,7 +23,7 @@ Result = TypeVar("Result")
 EXECUTORS: Final = "process, thread or dask://host:port"
 
 
-#: How often it is asked, while pieces run, how many steps they have done.
+#: Seconds between two questions, while pieces run, how many steps they have done.
 _SECONDS: Final = 0.2
 
 
@@ -73,7 +73,7 @@ def run_pieces(
         function: Of one piece. For processes and clusters it, the pieces and the results must be picklable.
         pieces: Its arguments.
         executor: ``process`` (spawned ones), ``thread``, or the address of a dask scheduler as ``dask://host:port``.
-        jobs: Processes or threads; with 1 all is done here, one after the other. A cluster has as many as it has.
+        jobs: Processes or threads; with 1 all are done here, one after the other. A cluster has as many as it has.
         on_result: Called in this thread with the number and the result of each piece as soon as it has ended.
         on_steps: Called in this thread, now and then, with the number of steps that pieces have done since the last
             call (``step_done``). A cluster does not tell. Steps of a piece that is run again count again.
@@ -126,7 +126,7 @@ def _run_on(
             running[workers.submit(function, pieces[number])] = number
         patience = None if on_steps is None else _SECONDS
         ended = wait(running, patience, return_when=FIRST_COMPLETED).done
-        done = workers.steps()  # asked once: pieces go on while they are told of
+        done = workers.steps()  # asked once, since pieces go on meanwhile
         if on_steps is not None and done > told:
             on_steps(done - told)
             told = done

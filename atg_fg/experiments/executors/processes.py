@@ -95,7 +95,7 @@ class _Worker:
 
     def __init__(self) -> None:
         self._context = _RecordingContext()
-        # Only its process writes to it, so that it needs no lock, which a process that is killed might hold for ever.
+        # Only its process writes to it. So it needs no lock, which a killed process might hold for ever.
         self.steps = self._context.RawValue(ctypes.c_uint64, 0)
         self.pool = ProcessPoolExecutor(1, mp_context=self._context, initializer=_prepare, initargs=(self.steps,))
 

@@ -112,8 +112,9 @@ def _order(graph: _FillGraph, by_number: bool, budget: EntryBudget) -> Eliminati
 class _FillGraph:
     """Which variables share a table, while variables are eliminated; finds the one that adds fewest edges.
 
-    Counting the edges that a variable of many neighbours would add is long, and it is seldom the cheapest. So a
-    count stops when it is certain that another variable is cheaper, and goes on only when that one is gone.
+    Counting the edges that a variable of many neighbours would add takes long, and such a variable is seldom the
+    cheapest. So a count stops when it is certain that another variable is cheaper, and goes on only when that one is
+    gone.
     """
 
     def __init__(self, scopes: Iterable[Sequence[int]], sizes: Sequence[int]) -> None:

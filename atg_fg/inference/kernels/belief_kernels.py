@@ -4,9 +4,9 @@ The symbols and the numbers are those of ``docs/model.md``: hypothesis h knows `
 state 0 is its collection node. With α a transition row is a share of its base, and its edges. p(X_t | O) sums to one in
 each row. Loops end at n; the rest of a row is padding.
 
-What Python calls takes arrays and numbers in plain tuples, for to take named ones apart would cost as much as a step
-of a small memory does; and loops take them out of tuples before they begin, since each access to a member counts its
-users. This module loads Numba.
+Functions that Python calls take arrays and numbers in plain tuples: taking named ones apart would cost as much as a
+step of a small memory does. Loops take them out of the tuples before they begin, since each access to a member counts
+its users. This module loads Numba.
 """
 
 from __future__ import annotations

@@ -29,7 +29,7 @@ def are_wanted() -> bool:
 
 
 def tell_of_compilation(tell: Callable[[], None]) -> None:
-    """Have a function called before the first loop of this process is compiled, rather than read from the cache."""
+    """Call a function before this process compiles its first loop; loops that are read from the cache do not count."""
     global _tell
     _tell = tell
 

@@ -91,7 +91,7 @@ def write_rows(
 
 @compiled
 def weigh_all(tables: tuple[Any, ...], concentration: float) -> None:
-    """Set what the counts of all rows of all hypotheses come to."""
+    """Set the probabilities of the edges in all rows of all hypotheses, from their counts."""
     _, _, begins, edges, counted, probability = tables
     for hypothesis in range(len(begins)):
         _weigh_own(edges, counted, probability, begins, hypothesis, concentration)
@@ -122,7 +122,7 @@ def weigh(
     action: int,
     concentration: float,
 ) -> None:
-    """Set what the counts of a transition row come to."""
+    """Set the probabilities of the edges in a transition row, from their counts."""
     total = concentration
     for edge in range(begins[hypothesis, action], begins[hypothesis, action + 1]):
         if edges[edge, 1] == source:
