@@ -8,6 +8,9 @@ DEMO_READY := $(if $(wildcard $(READY)),$(READY),$(VENV)/.ready-demo)
 PEERS := .venv-peers
 PEERS_READY := $(PEERS)/.ready
 
+# Tests start hundreds of processes, each of which would compile every module anew where this is set.
+unexport PYTHONDONTWRITEBYTECODE
+
 .DEFAULT_GOAL := help
 .PHONY: help setup peers demo test test-all test-peers torture package lint format notebooks docs bench results results-pictures results-engines results-robot results-goal results-evidence \
 	results-structure example-memory tour clean
