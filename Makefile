@@ -65,10 +65,10 @@ demo: $(DEMO_READY)  ## Let the robot recognise an object by turning it over, to
 	$(BIN)/atg-fg demo
 
 test: $(READY)  ## Run the tests
-	$(BIN)/python -m pytest -n auto --dist loadfile
+	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder
 
 test-all: $(READY)  ## Run the tests, slow ones too
-	$(BIN)/python -m pytest -n auto --dist loadfile -m 'not peers'
+	$(BIN)/python -m pytest -n auto --dist loadfile --no-loadscope-reorder -m 'not peers'
 
 test-peers: $(PEERS_READY)  ## Run the tests beside other libraries (JAX, pgmpy, pymdp, Stable-Baselines3, ap_gym), in .venv-peers
 	$(PEERS)/bin/python -m pytest -m peers tests/benchmarks/test_peers.py tests/experiments/test_recognition_agent.py \

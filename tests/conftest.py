@@ -1,7 +1,33 @@
+from pathlib import Path
+
 import hypothesis
 import pytest
 
 from tests import dask_cluster
+
+#: Files that take longest, in the order in which workers begin them, before all others: so none is left with a long one
+#: at the end. Where nothing is compiled yet, the first one compiles most loops of learning. Those that use them, too,
+#: come later, so that two workers do not compile the same.
+LONGEST = (
+    "engines/test_learned_structure.py",
+    "sim/worlds/test_picture_box_world.py",
+    "sim/worlds/test_robonaut_world.py",
+    "sim/worlds/test_stations_world.py",
+    "cli/test_endings.py",
+    "core/test_object_sense.py",
+    "report/test_browser.py",
+    "sim/worlds/test_rendered_world.py",
+    "sim/manipulation/test_waypoints.py",
+    "learning/test_learner.py",
+    "cli/test_live.py",
+    "cli/test_recordings.py",
+    "report/test_every_record.py",
+    "experiments/executors/test_base.py",
+    "cli/test_executors.py",
+    "unchanged/test_unchanged.py",
+    "test_torture.py",
+    "test_planted_faults.py",
+)
 
 
 def pytest_configure(config):
@@ -14,6 +40,13 @@ def pytest_configure(config):
         "atg-fg", derandomize=True, deadline=None, database=None, max_examples=n_examples
     )
     hypothesis.settings.load_profile("atg-fg")
+
+
+def pytest_collection_modifyitems(items):
+    """Put the files that take longest first."""
+    places = {Path(__file__).parent / name: place for place, name in enumerate(LONGEST)}
+    assert all(path.is_file() for path in places)
+    items.sort(key=lambda item: places.get(item.path, len(places)))
 
 
 @pytest.fixture(scope="session")

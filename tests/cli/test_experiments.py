@@ -43,6 +43,7 @@ def test_table1_of_other_objects_is_not_held_against_the_paper(run):
     assert (status, "79.2%" in output) == (0, False)
 
 
+@pytest.mark.slow
 def test_table1_is_the_same_for_any_number_of_jobs(run, tmp_path):
     for jobs in (1, 2):
         run("table1", *QUICK[:-1], jobs, "--tests", "2", "--actions", "3", "--json", tmp_path / f"{jobs}.json")

@@ -44,9 +44,11 @@ def test_it_goes_on_where_it_was_cut_off(tmp_path):
     assert summarise_ablation(kept) == summarise_ablation(whole)
 
 
-def test_any_number_of_jobs_gives_the_same():
+@pytest.mark.parametrize("executor", ["thread", pytest.param("process", marks=pytest.mark.slow)])
+def test_any_number_of_jobs_gives_the_same(executor):
     serial = run_ablation(CELLS, [0], N_TRIALS)
-    assert summarise_ablation(run_ablation(CELLS, [0], N_TRIALS, jobs=2)) == summarise_ablation(serial)
+    others = run_ablation(CELLS, [0], N_TRIALS, jobs=2, executor=executor)
+    assert summarise_ablation(others) == summarise_ablation(serial)
 
 
 @pytest.mark.parametrize(

@@ -51,9 +51,10 @@ def test_engines_agree_on_what_is_done():
     assert first.served == second.served
 
 
-def test_any_number_of_jobs_gives_the_same_and_another_seed_another():
+@pytest.mark.parametrize("executor", ["thread", pytest.param("process", marks=pytest.mark.slow)])
+def test_any_number_of_jobs_gives_the_same_and_another_seed_another(executor):
     serial = list(run_many(SMALL, seed=0, n_runs=3))
-    assert list(run_many(SMALL, seed=0, n_runs=3, jobs=2)) == serial
+    assert list(run_many(SMALL, seed=0, n_runs=3, jobs=2, executor=executor)) == serial
     assert list(run_many(SMALL, seed=1, n_runs=3)) != serial
 
 

@@ -51,6 +51,7 @@ def test_a_test_counts_what_it_says():
     assert result.success == (n_novel_right + result.recognition[0], 30)
 
 
+@pytest.mark.slow
 def test_the_same_seed_gives_the_same_result_for_any_number_of_jobs():
     plans = [(QUICK, seed) for seed in range(3)]
     assert list(run_tests(plans, jobs=1)) == list(run_tests(plans, jobs=2))
@@ -174,6 +175,7 @@ class TestRecords:
         with pytest.raises(InvalidInputError, match="already there"):
             run_test(self.PLAN, 0, tmp_path)
 
+    @pytest.mark.slow
     def test_each_of_several_processes_keeps_the_records_of_its_tests(self, tmp_path):
         plans = [(self.PLAN, seed) for seed in range(2)]
         results = list(run_tests(plans, 2, tmp_path))

@@ -46,7 +46,7 @@ def episode_hash(seed):
 def test_the_world_keeps_the_gymnasium_contract():
     world = make_world("rendered", render_mode="rgb_array", **NOMINAL)
     check_env(world.unwrapped)
-    assert check_world(world, trials=1) == 21
+    assert check_world(world, trials=1, steps=6) == 7
     world.close()
 
 
@@ -60,10 +60,9 @@ def test_it_has_the_spaces_of_the_ideal_world(make):
 def test_both_tags_are_read_in_every_orientation_under_jitter_and_noise(make):
     world = make(**NOMINAL)
     for orientation in range(24):
-        for cube in range(3):
-            seed = 3 * orientation + cube
-            observation, truth = world.reset(seed=seed, options={"object": cube, "orientation": orientation})
-            assert tuple(observation) == truth["pattern"]
+        shown = {"object": orientation % 3, "orientation": orientation}
+        observation, truth = world.reset(seed=orientation, options=shown)
+        assert tuple(observation) == truth["pattern"]
 
 
 @pytest.mark.slow
