@@ -28,7 +28,7 @@ def test_observations_are_of_the_space_and_each_look_is_rendered_anew(name, n_ob
         ("picture-box", {"weight": "yes"}, "weight: 'yes'; expected true or false"),
         ("picture-box", {"differ_in": "smell"}, "differ_in: 'smell'; expected one of: face, weight"),
         ("picture-box", {"weight_error": -0.1, "weight": True}, "object sense 'weight': error -0.1"),
-        ("picture-box", {"features": "no_such_module:embed"}, "features: 'no_such_module:embed'"),
+        ("picture-box", {"features": "no_such_module:embed"}, "features 'no_such_module:embed': cannot be imported"),
         (
             "picture-box",
             {"features": "sift"},
