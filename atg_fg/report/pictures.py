@@ -20,14 +20,17 @@ _MOST_BYTES: Final = 8_000_000
 #: Of a crop: bytes of its file, and pixels of a side.
 _MOST_CROP_BYTES: Final = 200_000
 _MOST_CROP_SIDE: Final = 256
+#: Characters of all crops in a page: of a hundred trials with pictures there are some three millions.
+MOST_CROPS: Final = 20_000_000
 
 
-def thumbnails(looks: Iterable[tuple[str, StepSummary]], folder: Path) -> dict[int, str]:
+def thumbnails(looks: Iterable[tuple[str, StepSummary]], folder: Path, room: int = MOST_CROPS) -> dict[int, str]:
     """Return for each symbol the crop that shows it most surely, the first one of several, as a ``data:`` address.
 
     Args:
         looks: Each look, and where it is, to be named in errors.
         folder: Where the record is.
+        room: Characters that they may have together; nothing is returned if they have more.
 
     Raises:
         InvalidInputError: A crop that is no small PNG in the folder, or confidences that are none.
@@ -38,10 +41,14 @@ def thumbnails(looks: Iterable[tuple[str, StepSummary]], folder: Path) -> dict[i
         for _, step in kept
     ]
     sure = [_confidences(step, f"{place}: truth: confidences") for place, step in kept]
-    return {
-        symbol: _crop_address(kept[look][1].crops[slot], folder, f"{kept[look][0]}: crops[{slot}]")
-        for symbol, (look, slot) in surest_looks(shown, sure).items()
-    }
+    found: dict[int, str] = {}
+    for symbol, (look, slot) in surest_looks(shown, sure).items():
+        place, step = kept[look]
+        found[symbol] = _crop_address(step.crops[slot], folder, f"{place}: crops[{slot}]")
+        room -= len(found[symbol])
+        if room < 0:
+            return {}
+    return found
 
 
 def _confidences(step: StepSummary, place: str) -> list[float | None]:

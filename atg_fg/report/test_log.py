@@ -23,7 +23,7 @@ from atg_fg.experiments.scores import Score
 from atg_fg.experiments.trial import can_be_learned, learn_from
 from atg_fg.policies import EntropyPolicy
 from atg_fg.report.content import Look, Report, TrialPage, shown_parameters
-from atg_fg.report.pictures import thumbnails
+from atg_fg.report.pictures import MOST_CROPS, thumbnails
 from atg_fg.report.summaries import looks_of, told_mistakes, told_truth, told_verdict, with_graphs
 from atg_fg.report.trial_record import best_objects
 from atg_fg.storage.checked_json import placed
@@ -37,8 +37,6 @@ _NOT_INFERRED: Final = (
 )
 
 
-#: Crops that a page takes, characters: of a hundred trials with pictures there are some three millions.
-_MOST_CROPS: Final = 20_000_000
 _CROPS_LEFT_OUT: Final = "There are more crops than a page takes: later trials are shown with numbers of symbols."
 
 
@@ -58,16 +56,17 @@ def test_report(test: RecordedTest, folder: Path | None) -> Report:
     merging = bool(test.header.get("merge_duplicates"))
     told = Retelling(test.assumptions, inferred=not (test.parameters.learn_structure or merging), merging=merging)
     by_entropy = test.header.get("policy", EntropyPolicy.name) == EntropyPolicy.name
-    pages, crops, room = [], dict[int, str](), _MOST_CROPS
+    pages, crops, room = [], dict[int, str](), MOST_CROPS
     for number, trial in enumerate(test.trials):
         with placed(f"{test.place}: trial {number}"):
             page = told.page(trial, f"trial {number}", test.parameters, by_entropy=by_entropy)
             if folder is not None and room > 0:
                 looks = ((f"look {look}", step) for look, step in enumerate(trial.steps))
-                crops.update(thumbnails(looks, folder))
+                crops.update(thumbnails(looks, folder, room))
                 drawn = {symbol for graph in page.graphs for aspect in graph.aspects for symbol in aspect}
-                page = replace(page, thumbnails={each: crops[each] for each in sorted(drawn & crops.keys())})
-                room -= sum(map(len, page.thumbnails.values()))
+                drawing = {each: crops[each] for each in sorted(drawn & crops.keys())}
+                room -= sum(map(len, drawing.values()))
+                page = replace(page, thumbnails=drawing if room >= 0 else {})
             pages.append(page)
     pages = with_mended(pages, test.trials)
     title = f"A test of {len(pages)} trials, {told.score.successes} of them right"

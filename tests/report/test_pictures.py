@@ -8,7 +8,9 @@ import struct
 import pytest
 
 from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.records import StepSummary
 from atg_fg.experiments.table1 import TestPlan, run_test
+from atg_fg.report.pictures import thumbnails
 from atg_fg.report.reading import read_report
 from tests.report.test_reading import changed
 
@@ -62,13 +64,27 @@ def test_a_page_takes_so_many_crops_of_a_test(tmp_path, monkeypatch):
     assert all(page.thumbnails for page in report.trials)
     assert report.notes == ()
     room = sum(map(len, report.trials[0].thumbnails.values()))
-    monkeypatch.setattr("atg_fg.report.test_log._MOST_CROPS", room)
+    monkeypatch.setattr("atg_fg.report.test_log.MOST_CROPS", room)
     report = read_report(log)
     assert [bool(page.thumbnails) for page in report.trials] == [True, False, False]
     assert report.notes == ("There are more crops than a page takes: later trials are shown with numbers of symbols.",)
     crop.unlink()
     with pytest.raises(InvalidInputError, match=r"trial 0: look [0-2]: crops\[0\]: 'a.png' is no file"):
         read_report(log)
+
+
+def test_a_trial_with_more_crops_than_a_page_takes_is_shown_with_numbers(tmp_path):
+    for name in "ab":
+        (tmp_path / f"{name}.png").write_bytes(png(48))
+    looks = [
+        ("here", StepSummary((3, 4), None, 0.5, 0.1, {}, crops=("a.png", "b.png"))),
+        ("there", StepSummary((5, None), None, 0.5, 0.1, {}, crops=(None, None))),
+    ]
+    whole = thumbnails(looks, tmp_path)
+    assert list(whole) == [3, 4]
+    room = sum(map(len, whole.values()))
+    assert thumbnails(looks, tmp_path, room) == whole
+    assert thumbnails(looks, tmp_path, room - 1) == {}
 
 
 @pytest.mark.parametrize(
