@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.report.chromium import Page, need_chromium
+from tests.report.chromium import Page, browser, need_chromium
 
 ROOT = Path(__file__).parents[1]
 #: The sides of three mugs: four around, the lid and the base.
@@ -67,8 +67,8 @@ def test_a_table_of_ones_own_is_learned_recognised_and_looked_at(program, tmp_pa
     program("atg-fg", "recognise", *told, cwd=tmp_path)
     found = json.loads((tmp_path / "next.json").read_text())
     assert found["score"]["success"]["rate"] >= 0.8
-    page = Page(tmp_path / "page.html")
-    try:
+    with browser() as address:
+        page = Page(tmp_path / "page.html", address)
         words = []
         for key in ("Home", "ArrowRight", "End"):
             page.press(key)
@@ -78,6 +78,5 @@ def test_a_table_of_ones_own_is_learned_recognised_and_looked_at(program, tmp_pa
         assert page.errors == []
         assert [url for url in page.requests if not url.startswith("data:")] == [(tmp_path / "page.html").as_uri()]
         page.screenshot(tmp_path / "page.png")
-    finally:
         page.close()
     assert (tmp_path / "page.png").stat().st_size > 10_000

@@ -1,4 +1,4 @@
-"""A page in a headless Chromium, by its DevTools protocol: keys are pressed as a person would."""
+"""Pages in a headless Chromium, by its DevTools protocol: keys are pressed as a person would."""
 
 import base64
 import contextlib
@@ -28,32 +28,42 @@ def need_chromium():
         pytest.skip("no Chromium on this computer")
 
 
-class Page:
-    """One page in one browser."""
-
-    def __init__(self, path, *, dark=False, size=(1280, 1000)):
-        import websocket
-
-        self._profile = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
-        width, height = size
-        self._process = subprocess.Popen(
+@contextlib.contextmanager
+def browser():
+    """Start a browser, and give the address at which it is told what to do."""
+    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as profile:
+        process = subprocess.Popen(
             [
                 binary(), "--headless=new", "--no-sandbox", "--disable-gpu", "--disable-dev-shm-usage",
                 "--no-first-run", "--remote-debugging-port=0", "--remote-allow-origins=*",
-                f"--window-size={width},{height}", f"--user-data-dir={self._profile.name}", "about:blank",
+                f"--user-data-dir={profile}", "about:blank",
             ],
             stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True, env={**os.environ, "LC_ALL": "C.UTF-8"},
         )  # fmt: skip
-        address = next(
-            found[1] for line in self._process.stderr if (found := re.search(r"DevTools listening on (ws://\S+)", line))
-        )
+        try:
+            listens = re.compile(r"DevTools listening on (ws://\S+)")
+            yield next(found[1] for line in process.stderr if (found := listens.search(line)))
+        finally:
+            process.terminate()
+            process.wait(20)
+            process.stderr.close()
+
+
+class Page:
+    """A page in a window of its own, which shares nothing with others of the browser at this address."""
+
+    def __init__(self, path, address, *, dark=False, size=(1280, 1000)):
+        import websocket
+
+        width, height = size
         self._socket = websocket.create_connection(address, timeout=60)
         self._number = 0
         self._session = None
         self.errors = []
         self.requests = []
-        target = self._call("Target.createTarget", url="about:blank")["targetId"]
-        self._session = self._call("Target.attachToTarget", targetId=target, flatten=True)["sessionId"]
+        context = self._call("Target.createBrowserContext", disposeOnDetach=True)["browserContextId"]
+        window = self._call("Target.createTarget", url="about:blank", newWindow=True, browserContextId=context)
+        self._session = self._call("Target.attachToTarget", targetId=window["targetId"], flatten=True)["sessionId"]
         for domain in ("Page", "Runtime", "Log", "Network"):
             self._call(f"{domain}.enable")
         scheme = [{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}]
@@ -82,13 +92,9 @@ class Page:
         Path(path).write_bytes(base64.b64decode(picture["data"]))
 
     def close(self):
-        """Close the browser."""
+        """Close the page."""
         with contextlib.suppress(Exception):
             self._socket.close()
-        self._process.terminate()
-        self._process.wait(20)
-        self._process.stderr.close()
-        self._profile.cleanup()
 
     def _call(self, method, **parameters):
         self._number += 1

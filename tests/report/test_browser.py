@@ -9,30 +9,30 @@ import pytest
 from atg_fg.report.page import write_report
 from atg_fg.report.reading import read_report
 from atg_fg.storage.memory_files import save_memory
-from tests.report.chromium import Page, need_chromium
+from tests.report.chromium import Page, browser, need_chromium
 from tests.report.conftest import NASTY
 from tests.report.test_crafted import long_trial
 
 PIXEL = "iVBORw0KGgoAAAANSUhEUgAAAAEAAAABCAYAAAAfFcSJAAAADUlEQVR42mNk+M9QDwADhgGAWjR9awAAAABJRU5ErkJggg=="
 RESULTS = Path(__file__).parents[2] / "results"
 
-pytestmark = pytest.mark.usefixtures("chromium")
-
 
 @pytest.fixture(scope="module")
 def chromium():
     need_chromium()
+    with browser() as address:
+        yield address
 
 
 @pytest.fixture
-def opened(tmp_path):
+def opened(tmp_path, chromium):
     """Make the page of a file and open it; at the end, nothing must have gone wrong in it."""
     pages = []
 
     def called(path, memory=None, **options):
         file = tmp_path / "page.html"
         write_report(read_report(path, memory), file)
-        pages.append(Page(file, **options))
+        pages.append(Page(file, chromium, **options))
         return pages[-1]
 
     yield called
