@@ -21,6 +21,10 @@ COMMANDS = {
 }
 
 
+#: Commands, and whether their output is buffered, that stand for all.
+QUICK = (("help", False), ("table", True))
+
+
 def begin(*arguments, **options):
     """Begin the program in a process group of its own, as a terminal does, which leaves SIGINT to it."""
     return subprocess.Popen(
@@ -58,11 +62,10 @@ def folder(tmp_path_factory):
 @pytest.mark.parametrize(
     ("command", "buffered"),
     [
-        *(("help", buffered) for buffered in (True, False)),
-        *(("table", buffered) for buffered in (True, False)),
+        *QUICK,
         *(
             pytest.param(command, buffered, marks=pytest.mark.slow)
-            for command in COMMANDS if command not in ("help", "table") for buffered in (True, False)
+            for command in COMMANDS for buffered in (True, False) if (command, buffered) not in QUICK
         ),
     ],
 )  # fmt: skip
@@ -84,7 +87,7 @@ class TestOutput:
         assert (error, process.returncode) == ("atg-fg: standard output: No space left on device\n", 2)
 
 
-@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "utf-8"])
+@pytest.mark.parametrize("encoding", ["ascii", pytest.param("latin-1", marks=pytest.mark.slow), "utf-8"])
 def test_what_an_encoding_does_not_know_is_written_out(encoding, folder):
     name = os.fsdecode(b"caf\xc3\xa9-\xff.json")
     (folder / name).write_bytes((folder / "memory.json").read_bytes())

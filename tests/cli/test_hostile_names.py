@@ -120,13 +120,11 @@ def test_structures_are_told_and_drawn_with_any_names(shown, tmp_path, name):
     memory = memory_json.memory_from_json(packaged.example_memory(), "example")
     names = (memory.names[0], name), (memory.assumptions.actions[0], f"{name}+"), ("top", f"{name}-")
     file.write_text(renamed(memory, *names))
-    for kind in ("png", "svg"):
-        drawn = tmp_path / f"structure.{kind}"
-        output = shown("memory", "structure", file, "--plot", drawn)
-        assert all(line in output for line in visible(name, keep="\n").split("\n"))
-        shown("memory", "structure", file, "--object", name, "--plot", drawn)
-        if kind == "svg":
-            ElementTree.fromstring(drawn.read_bytes())
+    output = shown("memory", "structure", file, "--plot", tmp_path / "structure.png")
+    assert all(line in output for line in visible(name, keep="\n").split("\n"))
+    drawn = tmp_path / "completed.svg"
+    shown("memory", "structure", file, "--object", name, "--plot", drawn)
+    ElementTree.fromstring(drawn.read_bytes())
 
 
 @pytest.mark.parametrize("name", [name for name in HOSTILE if "\0" not in name and "//" not in name])

@@ -19,7 +19,7 @@ CHUNKS, CHUNK_SIZE = 20, 26
 #: They make the whole graph anew at each question, which takes long; they get fewer of the models.
 ROUTES, ROUTE_CHUNKS = [engine for engine in EXACT_ENGINES if engine.startswith("gtsam-")], 4
 #: The rest is slow.
-QUICK_CHUNKS, QUICK_ROUTE_CHUNKS = 4, 2
+QUICK_CHUNKS, QUICK_ROUTE_CHUNKS = 2, 2
 TOLERANCE = 1e-12
 
 
