@@ -124,9 +124,15 @@ def picture(
 @app.command()
 def webcam(
     tags: Annotated[Path, typer.Option(help="Tags of the cubes, as print cube wrote them (JSON).")],
-    output: Annotated[Path, typer.Option("--output", "-o", writable=True, help="Video to write, .avi or .mp4.")],
+    output: Annotated[
+        Path,
+        typer.Option("--output", "-o", writable=True, help="Video to write, .avi or .mp4."),
+        plain_files.check_writable,
+    ],
     calibration: Annotated[
-        Path, typer.Option(writable=True, help="File for the calibration of the webcam, which live takes.")
+        Path,
+        typer.Option(writable=True, help="File for the calibration of the webcam, which live takes."),
+        plain_files.check_writable,
     ] = Path("webcam.json"),
     trials: Annotated[int, typer.Option(min=1, help="Cubes put down, each once before any comes again.")] = 3,
     actions: Annotated[
@@ -138,8 +144,6 @@ def webcam(
 
     Example: atg-fg sim webcam --tags cubes.json -o turns.avi
     """
-    plain_files.check_writable(output)
-    plain_files.check_writable(calibration)
     from sim.vision.random_film import film_cubes
 
     for number, (cube, turns) in enumerate(film_cubes(tags, output, calibration, trials, actions, seed)):

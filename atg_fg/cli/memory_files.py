@@ -135,7 +135,11 @@ def _import(files: list[Path], into: Path) -> None:
 def merge(
     first: Annotated[Path, typer.Argument(help="A memory; its names stay.", show_default=False)],
     second: Annotated[Path, typer.Argument(help="Another memory.", show_default=False)],
-    output: Annotated[Path, typer.Option("--output", "-o", writable=True, help="The new file.", show_default=False)],
+    output: Annotated[
+        Path,
+        typer.Option("--output", "-o", writable=True, help="The new file.", show_default=False),
+        plain_files.check_writable,
+    ],
     json_file: options.JsonFile = None,
 ) -> None:
     """Unite two memories. ATGs of the same name are one object if one of them goes on where the other one is.
@@ -145,7 +149,6 @@ def merge(
 
     Example: atg-fg memory merge robot.db other.json -o both.db
     """
-    plain_files.check_writable(output)
     if os.path.exists(output):
         raise InvalidInputError(f"{output}: is already there; expected the path of a new file")
     union = unite(load_memory(first), load_memory(second))

@@ -18,6 +18,11 @@ from atg_fg.storage.minari_recordings import read_minari, write_minari
 from atg_fg.storage.recordings import check_recording, completed, read_recording, write_recording
 from atg_fg.storage.rosbag_recordings import is_bag, read_topics
 
+Output = Annotated[
+    Path,
+    typer.Option("--output", "-o", writable=True, help=".jsonl or .csv to write.", show_default=False),
+    plain_files.check_writable,
+]
 app = typer.Typer(
     help="Check recordings of your own detector, and convert them. Example: atg-fg recordings check looks.csv",
     no_args_is_help=True,
@@ -76,9 +81,7 @@ def convert(
             help="A recording, CSV or JSON lines; a bag of ROS; or the name of a dataset.", show_default=False
         ),
     ],
-    output: Annotated[
-        Path, typer.Option("--output", "-o", writable=True, help=".jsonl or .csv to write.", show_default=False)
-    ],
+    output: Output,
     topics: Annotated[
         Path | None, typer.Option(help="JSON file that says in which topics of a bag labels and actions are.")
     ] = None,
@@ -143,9 +146,7 @@ def export(
 
 @app.command()
 def simulate(
-    output: Annotated[
-        Path, typer.Option("--output", "-o", writable=True, help=".jsonl or .csv to write.", show_default=False)
-    ],
+    output: Output,
     world: options.World = "detector",
     objects: Annotated[int, typer.Option(min=1, help="|O|, the number of objects that exist.")] = 8,
     trials: Annotated[int, typer.Option(min=1, help="Number of trials.")] = 48,
@@ -163,7 +164,6 @@ def simulate(
 
     Example: atg-fg recordings simulate -o looks.csv --wrong 0.2 --missing 0.1 --world-option confidences=true
     """
-    plain_files.check_writable(output)
     own = options.world_options(slip, wrong, missing, own=world_option)
     write_recording(simulated_recording(world, objects, trials, actions, seed, objects_seed, **own), output)
     say(f"saved: {output}")

@@ -59,6 +59,21 @@ OUTPUTS = {
 }
 
 
+#: Folders, and files whose name or content a command looks at first.
+CHECKED_OTHERWISE = {
+    *(("learn", "memory"), ("recognise", "memory"), ("recognise", "report"), ("bench", "markdown"), ("demo", "output")),
+    *(("goal", "records"), ("goal", "video"), ("live", "memory"), ("live", "draw"), ("look", "draw")),
+    *(
+        ("memory compact", "output"),
+        ("memory example", "output"),
+        ("memory export", "output"),
+        ("memory import", "into"),
+    ),
+    *(("print board", "output"), ("print cube", "output"), ("table1", "records"), ("table1", "save_memories")),
+    *(("sim picture", "output"), ("sim picture", "film"), ("sim picture", "table"), ("watch", "save")),
+}
+
+
 def commands(group, name=()):
     for word, command in group.commands.items():
         loaded = command.load() if hasattr(command, "load") else command
@@ -79,12 +94,12 @@ PAIRS = [
 
 
 def arguments(name, **paths):
-    """Return a command line that gives these paths, and something for all else that must be given."""
+    """Return a command line that gives these paths, and something of its own for all else that must be given."""
     words = name.split()
     for parameter in COMMANDS[name].params:
         given = paths.get(parameter.name)
         if given is None and parameter.required:
-            given = "MAR" if parameter.name == "task" else "something-else"
+            given = "MAR" if parameter.name == "task" else f"some-{parameter.name}"
         if given is not None:
             words += [str(given)] if parameter.param_type_name == "argument" else [parameter.opts[0], str(given)]
     return words
@@ -117,6 +132,21 @@ SAME = {
 
 def test_the_paths_that_a_command_writes_to_are_declared_as_such():
     assert {name: {path.name for path in paths if path.written} for name, paths in PATHS.items()} == OUTPUTS
+
+
+@pytest.mark.parametrize(
+    ("name", "option"),
+    [
+        (name, path.name)
+        for name, paths in PATHS.items()
+        for path in paths
+        if path.written and (name, path.name) not in CHECKED_OTHERWISE
+    ],
+)
+def test_a_result_that_cannot_be_written_is_refused_before_any_work(tmp_path, refused, name, option):
+    there = tmp_path / "nowhere" / "result.png"
+    assert f"{there}: cannot be written" in refused(*arguments(name, **{option: there}))
+    assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(
