@@ -27,6 +27,11 @@ LONGEST = (
     "unchanged/test_unchanged.py",
     "test_torture.py",
     "test_planted_faults.py",
+    "test_tour.py",
+    "test_notebooks.py",
+    "test_guides.py",
+    "test_five_minutes.py",
+    "sim/test_reliability.py",
 )
 
 

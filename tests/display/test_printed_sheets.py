@@ -34,8 +34,14 @@ def test_a_net_shows_the_six_tags_of_its_cube_on_a_sheet_of_the_papers_size():
         assert size == pytest.approx(PAPERS["a4"], abs=0.1)
 
 
-@pytest.mark.parametrize("paper", PAPERS)
-@pytest.mark.parametrize(("side", "tag_size"), [(40, 30), (52, 35.5), (90, 68)])
+@pytest.mark.parametrize(
+    ("side", "tag_size", "paper"),
+    [
+        pytest.param(*size, paper, marks=[pytest.mark.slow] if paper != usual else [])
+        for usual, size in zip(PAPERS, [(40, 30), (52, 35.5), (90, 68)], strict=True)
+        for paper in PAPERS
+    ],
+)
 def test_tags_have_their_true_size_and_place(paper, side, tag_size):
     pages, _ = printed(cube_sheets(CUBES[:1], "5X5_50", side, tag_size, paper))
     tags = {tag_id: tag for page in pages for tag_id, tag in seen(page).items()}
