@@ -119,9 +119,16 @@ results: $(READY)  ## Run the experiments of README's results in the ideal world
 	$(BIN)/atg-fg figure3 --preset default --json results/figure3_default.json --csv results/figure3_default.csv \
 		--plot docs/images/figure3_default.png
 
-# Boxes without tags; what simpler means make of them is printed.
-results-pictures: $(READY)  ## Run the experiments on boxes with pictures (about half an hour on 2 cores)
-	$(BIN)/atg-fg table1 --world picture-box --preset learned --tests 10 --json results/table1_picture-box_learned.json
+# Boxes without tags, each draw of boxes by itself; what simpler means make of them is printed.
+PICTURES := table1 --world picture-box --preset learned --tests 1
+results-pictures: $(READY)  ## Run the experiments on boxes with pictures (about an hour on 2 cores)
+	mkdir -p results/pictures
+	for seed in 0 1 2 3 4 5 6 7 8 9; do \
+		$(BIN)/atg-fg $(PICTURES) --seed $$seed --json results/pictures/learned_$$seed.json || exit; \
+	done
+	for seed in 0 1 2 3 4; do \
+		$(BIN)/atg-fg $(PICTURES) --seed $$seed --slip 0.04 --json results/pictures/slip_$$seed.json || exit; \
+	done
 	$(BIN)/atg-fg table1 --world picture-box --preset default --engine bayes-filter --tests 10 \
 		--json results/table1_picture-box_default.json
 	$(BIN)/python benchmarks/appearance.py 10
