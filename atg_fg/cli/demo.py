@@ -16,11 +16,10 @@ from atg_fg.core.memory import RobotMemory
 from atg_fg.core.records import TrialRecord, TrialStep
 from atg_fg.display import figures, trial_plots
 from atg_fg.display.frames import FrameFolder, has_camera
-from atg_fg.engines import begin_trial, engine_for
+from atg_fg.engines import begin_trial
 from atg_fg.experiments.trial import learn_from, run_trial
 from atg_fg.policies import EntropyPolicy
 from atg_fg.storage import memory_files, plain_files
-from atg_fg.storage.presets import preset as preset_named
 from atg_fg.storage.trial_record import to_json_lines
 from atg_fg.worlds.base import World
 
@@ -54,13 +53,11 @@ def demo(
     Example: atg-fg demo --seed 1 --novel
     """
     world = told_world(world)
-    parameters = preset_named(preset)
-    engine = options.engine_of(engine, parameters, "gtsam")
+    parameters, engine = options.model_of(preset, engine, "gtsam")
     figures.figure_class()  # fails now rather than at the end, if matplotlib is not installed
     folder = plain_files.make_folder(output)
     console = options.console(json_file)
     learn_seed, trial_seed = np.random.SeedSequence(seed).spawn(2)
-    engine_for(engine, parameters)
     world_options = {**CAMERAS.get(world, {}), **options.world_options(condition=condition, urdf=urdf)}
     # The last object is the one the robot never meets while it learns.
     made_world, memory = world_with_memory(world, parameters, seed, np.random.default_rng(learn_seed), **world_options)

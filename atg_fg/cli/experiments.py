@@ -21,7 +21,6 @@ from atg_fg.experiments.scores import TestResult, actions_a_trial, summarise
 from atg_fg.experiments.table1 import TestPlan, check_crops, run_tests
 from atg_fg.storage import memory_files, plain_files
 from atg_fg.storage.checked_json import without_none
-from atg_fg.storage.presets import preset as preset_named
 from atg_fg.worlds.registry import ARCUBE_WORLDS
 
 #: The average row of Table 1 as printed in the paper (5 tests, 10 actions a trial).
@@ -113,8 +112,7 @@ def table1(
     elif save_memories is not None:
         plain_files.make_folder(save_memories)
     world_options = options.world_options(slip, wrong, missing, condition, urdf, world_option)
-    model = preset_named(preset)
-    engine = options.engine_of(engine, model, "gtsam")
+    model, engine = options.model_of(preset, engine, "gtsam")
     plan = TestPlan(
         world=world,
         world_options=world_options,
@@ -239,8 +237,7 @@ def figure3(
     """
     numbers = parse_actions(actions)
     workers = options.check_executor_option(executor, jobs)
-    model = preset_named(preset)
-    engine = options.engine_of(engine, model, "bayes-filter")
+    model, engine = options.model_of(preset, engine, "bayes-filter")
     plan = TestPlan(
         world=world,
         world_options=options.world_options(slip, wrong, missing),

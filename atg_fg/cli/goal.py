@@ -16,7 +16,6 @@ from atg_fg.experiments.goal_scores import summarise
 from atg_fg.experiments.goals import COMPLETE, GoalPlan, run_goals, run_many, run_seed
 from atg_fg.policies import POLICIES
 from atg_fg.policies.goal import ENTROPY_THRESHOLD, PLANNERS
-from atg_fg.storage.presets import preset as preset_named
 from atg_fg.worlds.base import World
 
 #: Panels of the help page beside those in ``options``.
@@ -107,8 +106,7 @@ def goal(
         if world not in RENDER_MODES:
             raise unknown_name("--video: world with a camera", world, RENDER_MODES)
         figures.check_film_path(video)
-    model = preset_named(preset)
-    engine = options.engine_of(engine, model, "gtsam")
+    model, engine = options.model_of(preset, engine, "gtsam")
     world_options = options.world_options(slip, wrong, missing, condition, urdf)
     plan = GoalPlan(
         world=world,

@@ -36,7 +36,6 @@ from atg_fg.learning.structured_memory import memory_for
 from atg_fg.policies import make_policy
 from atg_fg.storage import plain_files
 from atg_fg.storage.memory_files import goes_to_database, has_memory, load_memory, open_memory, save_trial
-from atg_fg.storage.presets import preset as preset_named
 from atg_fg.worlds.arcube import ACTION_ROTATIONS, ORIENTATIONS
 
 if TYPE_CHECKING:
@@ -132,8 +131,7 @@ def live(
     from atg_fg.senses.viewpoint import Viewpoint
 
     kind, name = given[0]
-    parameters = preset_named(preset)
-    chosen = options.engine_of(engine, parameters, "bayes-filter")
+    parameters, chosen = options.model_of(preset, engine, "bayes-filter")
     chosen_policy = make_policy(policy, settled)
     viewpoint = None if pitch is None else Viewpoint.pitched(pitch)
     patience = Patience.of_pictures() if kind == "images" else None

@@ -20,11 +20,12 @@ from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.table import Table
 from atg_fg.display import figures
-from atg_fg.engines import ENGINES, usual_engine
+from atg_fg.engines import ENGINES, engine_for, usual_engine
 from atg_fg.experiments.executors.base import EXECUTORS, check_executor, is_cluster
 from atg_fg.policies import POLICIES, check_entropy_threshold
 from atg_fg.storage import plain_files
 from atg_fg.storage.presets import PRESETS
+from atg_fg.storage.presets import preset as preset_named
 from atg_fg.worlds.base import probability_option
 from atg_fg.worlds.registry import ARCUBE_WORLDS, WORLDS
 
@@ -181,9 +182,17 @@ def _own_option(text: str) -> tuple[str, Any]:
         return name, value
 
 
-def engine_of(engine: str | None, parameters: ModelParameters, usual: str) -> str:
-    """Return the engine that was asked for, or else the usual one, or the one that the parameters need."""
-    return usual_engine(parameters, usual) if engine is None else engine
+def model_of(preset: str, engine: str | None, usual: str) -> tuple[ModelParameters, str]:
+    """Return a preset's parameters, and the engine: the one asked for, or else the usual one, or the one they need.
+
+    Raises:
+        UnknownNameError: There is no such preset or engine.
+        InvalidInputError: The preset cannot be read, or the engine is none or does not know what the preset asks for.
+    """
+    parameters = preset_named(preset)
+    chosen = usual_engine(parameters, usual) if engine is None else engine
+    engine_for(chosen, parameters)
+    return parameters, chosen
 
 
 def check_executor_option(executor: str, jobs: int | None) -> int:

@@ -20,7 +20,6 @@ from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.plugins import loaded, registered
 from atg_fg.core.recordings import Recording, assumptions_for
 from atg_fg.core.table import Table
-from atg_fg.engines import engine_for
 from atg_fg.experiments import recorded_trials
 from atg_fg.experiments.scores import Score
 from atg_fg.learning.predictive_checks import summary_of_evidence, too_many_graphs
@@ -34,7 +33,6 @@ from atg_fg.storage.memory_files import (
     open_memory,
     save_memory,
 )
-from atg_fg.storage.presets import preset as preset_named
 from atg_fg.storage.recording_oddities import oddities
 from atg_fg.storage.recordings import (
     RecordingSpec,
@@ -84,9 +82,7 @@ def learn(
 
     Example: atg-fg learn looks.csv --memory robot.db --objects 8
     """
-    parameters = preset_named(preset)
-    chosen = options.engine_of(engine, parameters, "bayes-filter")
-    engine_for(chosen, parameters)
+    parameters, chosen = options.model_of(preset, engine, "bayes-filter")
     given = given_spec(spec, slots, actions, labels, objects, aspects, exclusive)
     recordings = [read_recording(file, given) for file in files]
     if name is not None:
@@ -131,9 +127,7 @@ def recognise(
     if report is not None:
         plain_files.check_writable(report)
         write_page = _page_writer()
-    parameters = preset_named(preset)
-    chosen = options.engine_of(engine, parameters, "bayes-filter")
-    engine_for(chosen, parameters)
+    parameters, chosen = options.model_of(preset, engine, "bayes-filter")
     given = given_spec(spec, slots, actions, labels, objects, aspects, exclusive)
     recordings = [read_recording(file, given) for file in files]
     if not learns and not os.path.exists(memory):

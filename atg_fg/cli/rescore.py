@@ -8,11 +8,9 @@ from typing import Annotated
 import typer
 
 from atg_fg.cli import options
-from atg_fg.engines import engine_for
 from atg_fg.experiments.document_tables import tables_of
 from atg_fg.experiments.rescore import rescore as judged_anew
 from atg_fg.experiments.scores import pooled_interval
-from atg_fg.storage.presets import preset as preset_named
 from atg_fg.storage.recorded_test import recorded_tests
 
 
@@ -28,9 +26,7 @@ def rescore(
 
     Example: atg-fg rescore results/robonaut/nominal_default/test-0000.jsonl.gz --preset learned
     """
-    parameters = preset_named(preset)
-    engine = options.engine_of(engine, parameters, "bayes-filter")
-    engine_for(engine, parameters)
+    parameters, engine = options.model_of(preset, engine, "bayes-filter")
     recorded = [test for file in files for test in recorded_tests(file)]
     results = {test.place: judged_anew(test, engine, parameters) for test in recorded}
     tests = [

@@ -79,8 +79,7 @@ def trial(
     if frames and record is None:
         raise InvalidInputError("--frames: no record to keep them with; expected --record FILE")
     chosen_policy = make_policy(policy, settled)
-    parameters = preset_named(preset)
-    engine = options.engine_of(engine, parameters, "gtsam")
+    parameters, engine = options.model_of(preset, engine, "gtsam")
     world_options = options.world_options(slip, wrong, missing, condition, urdf)
     header: dict[str, Any] = {"engine": engine, "policy": policy, "preset": preset, "world": world, "seed": seed}
     if settled is not None:

@@ -15,10 +15,9 @@ from atg_fg.cli.story import Story
 from atg_fg.cli.terminal import say
 from atg_fg.core.records import TrialStep
 from atg_fg.display.rerun_viewer import TrialViewer, check_path, import_rerun
-from atg_fg.engines import begin_trial, engine_for
+from atg_fg.engines import begin_trial
 from atg_fg.experiments.trial import run_trial
 from atg_fg.policies import make_policy
-from atg_fg.storage.presets import preset as preset_named
 
 
 def watch(
@@ -47,9 +46,7 @@ def watch(
     import_rerun()  # fails now rather than after the memory is learned, if it is not installed
     if save is not None:
         check_path(save)
-    parameters = preset_named(preset)
-    engine = options.engine_of(engine, parameters, "bayes-filter")
-    engine_for(engine, parameters)
+    parameters, engine = options.model_of(preset, engine, "bayes-filter")
     chosen_policy = make_policy(policy)
     learn_seed, trial_seed = np.random.SeedSequence(seed).spawn(2)
     made_world, memory = world_with_memory(
