@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.inference.kernels.compilation import compiled
+from atg_fg.inference.kernels.compilation import compiled, compiled_within
 from atg_fg.learning.kernels import TrialArrays, copy_into, draw_by_logarithm, shuffled
 
 #: Maps whose evidence a chain has at hand: a later one takes the place of an earlier one.
@@ -120,7 +120,7 @@ def anneal_maps(
     return best
 
 
-@compiled
+@compiled_within
 def count_losses(sources: IntArray) -> int:
     """Return how many actions lose content."""
     n_losses = 0

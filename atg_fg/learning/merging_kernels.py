@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from atg_fg.core.patterns import IntArray
-from atg_fg.inference.kernels.compilation import compiled
+from atg_fg.inference.kernels.compilation import compiled, compiled_within
 
 #: Looks that one integer has a bit for.
 _BITS = 62
@@ -77,7 +77,7 @@ def note(automaton: Automaton, state: int, change: int) -> None:
     automaton.counts[_CHANGES] += 1
 
 
-@compiled
+@compiled_within
 def learn_edge(automaton: Automaton, state: int, edge: int, target: int) -> None:
     """Let an edge that was unknown lead to a state."""
     automaton.edges[state, edge] = target
@@ -135,7 +135,7 @@ def link(automaton: Automaton, state: int, edge: int, target: int, to_do: IntArr
     return True
 
 
-@compiled
+@compiled_within
 def undo(automaton: Automaton, n_added: int, n_left: int) -> None:
     """Take back all changes, and the states that were added with them."""
     while automaton.counts[_CHANGES]:
@@ -153,7 +153,7 @@ def undo(automaton: Automaton, n_added: int, n_left: int) -> None:
     automaton.counts[_ADDED], automaton.counts[_LEFT] = n_added, n_left
 
 
-@compiled
+@compiled_within
 def has(symbols: IntArray, symbol: int) -> bool:
     """Return whether a symbol is among those of some looks."""
     for look in range(len(symbols)):
@@ -163,7 +163,7 @@ def has(symbols: IntArray, symbol: int) -> bool:
     return False
 
 
-@compiled
+@compiled_within
 def insert(
     automaton: Automaton,
     next_modes: IntArray,
@@ -212,7 +212,7 @@ def insert(
     return True
 
 
-@compiled
+@compiled_within
 def merge_hidden(automaton: Automaton, n_slots: int, most: int, to_do: IntArray) -> bool:
     """Merge states out of view while they do not contradict; return whether they are no more than can be tried.
 

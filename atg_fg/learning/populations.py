@@ -279,5 +279,6 @@ def compiled_maps(maps: SharedStructure) -> Structure:
         TooLargeError: There are more poses than a structure may have.
     """
     poses = maps.poses()
-    successors = np.ascontiguousarray(poses.successors.T)
-    return Structure(successors, np.ascontiguousarray(poses.registers[:, : maps.n_slots]), maps.n_registers)
+    # All loops are compiled anew for arrays that are read-only, or laid out otherwise: these are copies, always alike.
+    successors = np.array(poses.successors.T, order="C")
+    return Structure(successors, np.array(poses.registers[:, : maps.n_slots], order="C"), maps.n_registers)

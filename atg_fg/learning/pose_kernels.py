@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.inference.kernels.compilation import compiled
+from atg_fg.inference.kernels.compilation import compiled, compiled_within
 
 #: Keeps divisions by what can be zero in range.
 _TINY = 1e-12
@@ -37,7 +37,7 @@ def probability_of_look(
     return result
 
 
-@compiled
+@compiled_within
 def different(shown: FloatArray, registers: IntArray) -> float:
     """Return the probability that independent draws of the symbols of some registers are all different."""
     n_slots, n_symbols = len(registers), shown.shape[1]

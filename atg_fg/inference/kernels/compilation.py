@@ -44,6 +44,19 @@ def compiled(function: _Function) -> _Function:
     return result
 
 
+def compiled_within(function: _Function) -> _Function:
+    """Have Numba compile a function as ``compiled`` does that compiled functions alone call, never Python.
+
+    What Python would call it by takes a third of the time to compile.
+
+    Raises:
+        MissingDependencyError: Numba is not installed.
+    """
+    options = {"cache": True, "error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+    result: _Function = _numba().njit(**options)(function)
+    return result
+
+
 def compiled_if_installed(function: _Function) -> _Function:
     """Have Numba compile a function as ``compiled`` does; without Numba Python runs the same loop, slowly."""
     return compiled(function) if _is_installed() else function
