@@ -10,7 +10,15 @@ from numpy.typing import NDArray
 
 from atg_fg.core.log_math import log_sum_exp
 from atg_fg.core.patterns import MISSING, FloatArray, IntArray
-from atg_fg.learning import gibbs_kernels, kernels, look_kernels, object_kernels, slip_kernels
+from atg_fg.learning import (
+    gibbs_kernels,
+    kernels,
+    look_kernels,
+    object_kernels,
+    slip_kernels,
+    transition_kernels,
+    weight_kernels,
+)
 from atg_fg.learning.kernels import Clusters, TrialArrays
 from atg_fg.learning.raw_trials import Recording
 from atg_fg.learning.sampling_task import Structure, Task
@@ -217,7 +225,7 @@ class Chain:
         # An entry costs as much as there are trials: where there are many, some are moved in each sweep.
         n_entries = max(self.successors.size * ALL_TRIALS // max(len(self.clusters.owner), ALL_TRIALS), 1)
         for number in (0, *self.own_automata):
-            gibbs_kernels.transition_moves(self.trials(task), self.clusters, number, n_entries, beta, rng)
+            transition_kernels.transition_moves(self.trials(task), self.clusters, number, n_entries, beta, rng)
 
     def _moved(self, task: Task, order: IntArray, beta: float, rng: np.random.Generator) -> FloatArray:
         votes = np.zeros(len(self.clusters.n_trials) + 1)
@@ -331,7 +339,7 @@ class Chain:
         free, n_objects = gibbs_kernels.take_out(trials, last, self.clusters, path)
         weights = np.full((len(self.clusters.n_trials), self.n_states), -np.inf)
         log_new, log_own = float(task.log_new[n_objects]), self._log_own(task)
-        gibbs_kernels.trial_weights(trials, last, self.clusters, free, log_new, weights)
+        weight_kernels.trial_weights(trials, last, self.clusters, free, log_new, weights)
         total = log_sum_exp(weights.ravel()) - np.log(self.n_states)
         if len(log_own):
             share = gibbs_kernels.sharing(self.clusters)

@@ -5,22 +5,21 @@ from __future__ import annotations
 import numpy as np
 
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.inference.kernels.compilation import compiled
+from atg_fg.inference.kernels.compilation import compiled, compiled_within
 from atg_fg.learning.kernels import (
     Clusters,
     TrialArrays,
-    copy_into,
     draw_by_logarithm,
     forget,
     learn_again,
-    learn_all_again,
     log_product,
     look_up,
-    shuffled,
     take_in,
     walk,
 )
 from atg_fg.learning.object_kernels import cluster_weights
+from atg_fg.learning.transition_kernels import transition_moves
+from atg_fg.learning.weight_kernels import trial_weights
 
 #: Draws of an automaton for the evidence of a fresh object that has its own, and how one is annealed on a first trial.
 OWN_DRAWS = 2000
@@ -48,113 +47,14 @@ def take_out(trials: TrialArrays, trial: int, clusters: Clusters, path: IntArray
     return free, n_clusters
 
 
-@compiled
-def trial_weights(
-    trials: TrialArrays, trial: int, clusters: Clusters, free: int, log_new: float, weights: FloatArray
-) -> None:
-    """Fill in ln p(trial, start | cluster) up to the prior of starts, shape [C, S]; −∞ of clusters that are not there.
-
-    Args:
-        trials: All of them.
-        trial: One that is taken out.
-        clusters: Of the others.
-        free: The cluster that stands for a new object.
-        log_new: Ln of its weight beside that of each known object.
-        weights: To be filled in.
-    """
-    n_states = weights.shape[1]
-    local, visited = np.empty(clusters.tables.shape[1:]), np.empty(clusters.tables.shape[1], np.int64)
-    path, length = np.empty(trials.looks.shape[1], np.int64), trials.lengths[trial]
-    weights[:] = -np.inf
-    # All that follow the shared automaton go the same way from a start, the others each their own.
-    for start in range(n_states):
-        walk(clusters.successors[0], trials.actions[trial], length, start, path)
-        n_visited, scale = look_up(trials.looks[trial], length, path, clusters.registers, local, visited)
-        for cluster in range(len(clusters.n_trials)):
-            if clusters.automaton[cluster] == 0 and (clusters.n_trials[cluster] > 0 or cluster == free):
-                weights[cluster, start] = scale + log_product(clusters.tables[cluster], local, visited, n_visited)
-    for cluster in range(len(clusters.n_trials)):
-        if clusters.automaton[cluster] > 0 and clusters.n_trials[cluster] > 0:
-            for start in range(n_states):
-                successors = clusters.successors[clusters.automaton[cluster]]
-                walk(successors, trials.actions[trial], length, start, path)
-                n_visited, scale = look_up(trials.looks[trial], length, path, clusters.registers, local, visited)
-                weights[cluster, start] = scale + log_product(clusters.tables[cluster], local, visited, n_visited)
-    prior = cluster_weights(trials, trial, clusters, free, log_new)
-    for cluster in range(len(prior)):
-        for start in range(n_states):
-            weights[cluster, start] += prior[cluster]
-
-
-@compiled
+@compiled_within
 def log_total(logarithms: FloatArray) -> float:
     """Return ln Σ exp of a table, of which −∞ stands for zero."""
-    peak = logarithms.max()
-    return float(peak + np.log(np.exp(logarithms - peak).sum())) if peak > -np.inf else float(peak)
-
-
-@compiled
-def transition_moves(
-    trials: TrialArrays, clusters: Clusters, automaton: int, n_entries: int, beta: float, rng: np.random.Generator
-) -> None:
-    """Draw so many entries of an automaton's successors given all else: objects, starts, and the other entries."""
-    successors = clusters.successors[automaton]
-    n_actions, n_states = successors.shape[0] - 1, successors.shape[1]
-    path, scores = np.empty(trials.looks.shape[1], np.int64), np.empty(n_states)
-    passing, others = np.empty(len(trials.lengths), np.int64), np.empty_like(clusters.tables)
-    for entry in shuffled(n_actions * n_states, rng)[:n_entries]:
-        action, state = entry // n_states, entry % n_states
-        # Only the trials that pass this entry say anything of it; what the others say of their objects stays.
-        n_passing = learn_from_others(trials, clusters, automaton, action, state, path, passing)
-        for position in range(n_passing):
-            cluster = clusters.owner[passing[position]]
-            copy_into(others[cluster], clusters.tables[cluster])
-        for successor in range(n_states):
-            successors[action, state] = successor
-            scores[successor] = 0.0
-            for position in range(n_passing):
-                cluster = clusters.owner[passing[position]]
-                copy_into(clusters.tables[cluster], others[cluster])
-            for position in range(n_passing):
-                trial = passing[position]
-                scores[successor] += take_in(trials, trial, clusters, clusters.owner[trial], path)
-        successors[action, state] = draw_by_logarithm(scores, beta, rng)
-    learn_all_again(trials, clusters, automaton, path)
-
-
-@compiled
-def learn_from_others(
-    trials: TrialArrays,
-    clusters: Clusters,
-    automaton: int,
-    action: int,
-    state: int,
-    path: IntArray,
-    passing: IntArray,
-) -> int:
-    """Make tables of what follows an automaton anew from the trials in which it does not take an action in a state.
-
-    The trials in which it does are filled in; only tables of their objects are right. Returns how many they are.
-    """
-    successors = clusters.successors[automaton]
-    n_passing = 0
-    for cluster in range(len(clusters.n_trials)):
-        if clusters.n_trials[cluster] > 0 and clusters.automaton[cluster] == automaton:
-            forget(clusters, cluster)
-    for trial in range(len(trials.lengths)):
-        cluster = clusters.owner[trial]
-        if cluster < 0 or clusters.automaton[cluster] != automaton:
-            continue
-        walk(successors, trials.actions[trial], trials.lengths[trial], clusters.start[trial], path)
-        is_passing = False
-        for time in range(trials.lengths[trial] - 1):
-            is_passing = is_passing or (trials.actions[trial, time] == action and path[time] == state)
-        if is_passing:
-            passing[n_passing] = trial
-            n_passing += 1
-        else:
-            take_in(trials, trial, clusters, cluster, path)
-    return n_passing
+    peak, total = logarithms.max(), 0.0
+    for logarithm in logarithms.flat:
+        if logarithm > -np.inf:
+            total += np.exp(logarithm - peak)
+    return float(peak + np.log(total)) if total > 0 else float(peak)
 
 
 @compiled
@@ -213,7 +113,7 @@ def sharing(clusters: Clusters) -> float:
     return (n_sharing + 1.0) / (n_objects + 2.0)
 
 
-@compiled
+@compiled_within
 def begin_own(trials: TrialArrays, trial: int, clusters: Clusters, free: int, rng: np.random.Generator) -> None:
     """Let a trial be the first of an object with an automaton of its own, which is annealed on it."""
     own = 1 + free
@@ -264,7 +164,7 @@ def entries_used(trials: TrialArrays, clusters: Clusters, automaton: int) -> int
     return int(used.sum())
 
 
-@compiled
+@compiled_within
 def count_votes(weights: FloatArray, free: int, votes: FloatArray) -> None:
     """Add p(cluster), summed over the second axis of logarithms, to votes, *new* after all that there are."""
     total, new = log_total(weights.ravel()), len(votes) - 1
@@ -274,7 +174,7 @@ def count_votes(weights: FloatArray, free: int, votes: FloatArray) -> None:
             votes[new if cluster == free or cluster >= new else cluster] += np.exp(weights[cluster] - total).sum()
 
 
-@compiled
+@compiled_within
 def put_in(trials: TrialArrays, trial: int, clusters: Clusters, cluster: int, start: int, path: IntArray) -> None:
     """Put a trial that is taken out into a cluster."""
     clusters.owner[trial], clusters.start[trial] = cluster, start

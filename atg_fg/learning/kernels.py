@@ -15,11 +15,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.inference.kernels.compilation import compiled
+from atg_fg.inference.kernels.compilation import compiled, compiled_within
 from atg_fg.learning.raw_trials import NOTHING_FELT
 
 #: Products are put aside as a logarithm before they leave the range of floating-point numbers.
-_SMALL = 1e-120
+SMALL = 1e-120
+#: What is so many nats less probable than the most probable is not drawn.
+NEVER_DRAWN = -45.0
 
 
 class TrialArrays(NamedTuple):
@@ -63,7 +65,7 @@ class Clusters(NamedTuple):
     prior: FloatArray
 
 
-@compiled
+@compiled_within
 def draw(weights: FloatArray, rng: np.random.Generator) -> int:
     """Return an index drawn by weights that need not be normalised."""
     rest = rng.random() * weights.sum()
@@ -77,10 +79,14 @@ def draw(weights: FloatArray, rng: np.random.Generator) -> int:
     return chosen
 
 
-@compiled
+@compiled_within
 def draw_by_logarithm(logarithms: FloatArray, beta: float, rng: np.random.Generator) -> int:
     """Return an index drawn by exp(β · logarithm)."""
-    return draw(np.exp(beta * (logarithms - logarithms.max())), rng)
+    peak, weights = logarithms.max(), np.empty(len(logarithms))
+    for index in range(len(logarithms)):
+        exponent = beta * (logarithms[index] - peak)
+        weights[index] = np.exp(exponent) if exponent > NEVER_DRAWN else 0.0
+    return draw(weights, rng)
 
 
 @compiled
@@ -100,7 +106,7 @@ def shuffled(n: int, rng: np.random.Generator) -> IntArray:
     return order
 
 
-@compiled
+@compiled_within
 def copy_into(target: NDArray[Any], source: NDArray[Any]) -> None:
     """Copy a table of the same shape; ``target[:] = source`` compares the shapes, which takes seconds to compile."""
     for row in range(source.shape[0]):
@@ -116,7 +122,7 @@ def walk(successors: IntArray, actions: IntArray, length: int, start: int, path:
         path[time + 1] = successors[actions[time], path[time]]
 
 
-@compiled
+@compiled_within
 def look_up(
     looks: FloatArray, length: int, path: IntArray, registers: IntArray, local: FloatArray, visited: IntArray
 ) -> tuple[int, float]:
@@ -141,14 +147,14 @@ def look_up(
                 for symbol in range(n_symbols):
                     local[register, symbol] *= looks[time, slot, symbol]
                     peak = max(peak, local[register, symbol])
-                if 0.0 < peak < _SMALL:
+                if 0.0 < peak < SMALL:
                     for symbol in range(n_symbols):
                         local[register, symbol] /= peak
                     log_scale += np.log(peak)
     return n_visited, log_scale
 
 
-@compiled
+@compiled_within
 def log_product(table: FloatArray, local: FloatArray, visited: IntArray, n_visited: int) -> float:
     """Return ln Π_r Σ_c table(r, c) · local(r, c) over the registers that were visited."""
     product, logarithm = 1.0, 0.0
@@ -158,7 +164,7 @@ def log_product(table: FloatArray, local: FloatArray, visited: IntArray, n_visit
         for symbol in range(local.shape[1]):
             total += table[register, symbol] * local[register, symbol]
         product *= total
-        if product < _SMALL:
+        if product < SMALL:
             logarithm += np.log(product) if product > 0 else -1e6
             product = 1.0
     return float(logarithm + np.log(product))
@@ -188,7 +194,7 @@ def fresh_log_evidence(
     return result
 
 
-@compiled
+@compiled_within
 def take_in(trials: TrialArrays, trial: int, clusters: Clusters, cluster: int, path: IntArray) -> float:
     """Multiply a trial into the table of a cluster; return ln p(trial | what the cluster knew, its start)."""
     table, registers = clusters.tables[cluster], clusters.registers
@@ -206,7 +212,7 @@ def take_in(trials: TrialArrays, trial: int, clusters: Clusters, cluster: int, p
                 for symbol in range(table.shape[1]):
                     table[register, symbol] /= total
             product *= total
-            if product < _SMALL:
+            if product < SMALL:
                 logarithm += np.log(product) if product > 0 else -1e6
                 product = 1.0
     return float(logarithm + np.log(product))
@@ -220,7 +226,7 @@ def forget(clusters: Clusters, cluster: int) -> None:
             clusters.tables[cluster, register, symbol] = clusters.prior[symbol]
 
 
-@compiled
+@compiled_within
 def learn_again(trials: TrialArrays, clusters: Clusters, cluster: int, path: IntArray) -> float:
     """Make the table of a cluster anew from its trials; return ln of their evidence, given their starts."""
     forget(clusters, cluster)

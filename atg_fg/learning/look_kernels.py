@@ -13,11 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.inference.kernels.compilation import compiled
-from atg_fg.learning.gibbs_kernels import count_votes, put_in, take_out, trial_weights
+from atg_fg.inference.kernels.compilation import compiled, compiled_within
+from atg_fg.learning.gibbs_kernels import count_votes, put_in, take_out
 from atg_fg.learning.kernels import Clusters, TrialArrays, copy_into, draw_by_logarithm, walk
 from atg_fg.learning.object_kernels import cluster_weights
 from atg_fg.learning.slip_kernels import slip_paths
+from atg_fg.learning.weight_kernels import trial_weights
 
 #: Objects and starts whose looks are judged: so many nats behind the best, where slots err each for itself.
 _MARGIN = 12.0
@@ -73,7 +74,7 @@ def judge_looks(
     return result
 
 
-@compiled
+@compiled_within
 def settle(
     trials: TrialArrays, looks: FloatArray, trial: int, wrong: NDArray[np.bool_], judged: NDArray[np.bool_]
 ) -> None:

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.inference.kernels.compilation import compiled
-from atg_fg.learning.gibbs_kernels import count_votes, log_total, put_in, take_out, trial_weights
+from atg_fg.learning.gibbs_kernels import count_votes, log_total, put_in, take_out
 from atg_fg.learning.kernels import Clusters, TrialArrays, copy_into, draw_by_logarithm
 from atg_fg.learning.object_kernels import cluster_weights
+from atg_fg.learning.weight_kernels import trial_weights
 
 #: Paths with slips that are followed at once, and how improbable one may be beside the best.
 _MAX_PATHS = 256

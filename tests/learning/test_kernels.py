@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from atg_fg.learning import chain as sampler
-from atg_fg.learning import gibbs_kernels, kernels, map_kernels, slip_kernels
+from atg_fg.learning import gibbs_kernels, kernels, map_kernels, slip_kernels, transition_kernels, weight_kernels
 from atg_fg.learning.chain import Chain
 from atg_fg.learning.detector_noise import DetectorNoise
 from atg_fg.learning.kernels import TrialArrays
@@ -99,7 +99,7 @@ def test_weights_of_a_trial_are_those_of_enumeration():
     trials = drawn_trials(np.random.default_rng(3))
     chain, _ = chain_of(trials, [0, 0, 1, -1], [0, 2, 1, 0])
     weights = np.zeros((len(chain.clusters.n_trials), 3))
-    gibbs_kernels.trial_weights(trials, 3, chain.clusters, 2, 0.7, weights)
+    weight_kernels.trial_weights(trials, 3, chain.clusters, 2, 0.7, weights)
     clusters = [[(0, 0, ()), (1, 2, ())], [(2, 1, ())]]
     for start in range(3):
         for number, cluster in enumerate(clusters):
@@ -347,22 +347,23 @@ def test_errors_that_recur_are_the_structures_and_those_that_do_not_are_the_dete
     assert chain.log_odds_of_mistakes(task) == 0.0
 
 
-def test_an_entry_is_drawn_by_what_the_trials_that_pass_it_say():
-    trials = drawn_trials(np.random.default_rng(19))
+@pytest.mark.parametrize("n_looks", [4, 40])
+def test_an_entry_is_drawn_by_what_the_trials_that_pass_it_say(n_looks):
+    trials = drawn_trials(np.random.default_rng(19), n_looks=n_looks)
     chain, _ = chain_of(trials, [0, 0, 1, 0], [0, 1, 2, 0])
-    clusters, path = chain.clusters, np.empty(trials.looks.shape[1], dtype=np.int64)
-    passing = np.empty(4, dtype=np.int64)
+    clusters, successors = chain.clusters, chain.clusters.successors[0]
+    work, scores = transition_kernels.room_for(clusters), np.empty(3)
+    paths = np.empty(trials.actions.shape, dtype=np.int64)
     for action, state in itertools.product(range(2), range(3)):
-        says, joint = [], []
+        before, joint = successors[action, state], []
         for successor in range(3):
-            clusters.successors[0, action, state] = successor
-            joint.append(kernels.learn_all_again(trials, clusters, 0, path))
-            n_passing = gibbs_kernels.learn_from_others(trials, clusters, 0, action, state, path, passing)
-            taken = [
-                kernels.take_in(trials, trial, clusters, clusters.owner[trial], path) for trial in passing[:n_passing]
-            ]
-            says.append(sum(taken))
-        assert np.allclose(np.diff(says), np.diff(joint), atol=1e-12)
+            successors[action, state] = successor
+            joint.append(kernels.learn_all_again(trials, clusters, 0, paths[0]))
+        successors[action, state] = before
+        transition_kernels.walk_all(trials, clusters, 0, paths)
+        transition_kernels.score_successors(trials, clusters, 0, action, state, paths, work, scores)
+        assert np.allclose(np.diff(scores), np.diff(joint), atol=1e-12 * n_looks)
+        assert successors[action, state] == before
 
 
 def test_beyond_two_hundred_trials_a_sweep_moves_a_bounded_number(monkeypatch):
