@@ -8,15 +8,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.inference.kernels.compilation import compiled
+from atg_fg.inference.kernels.compilation import compiled, compiled_within
 from atg_fg.learning.gibbs_kernels import count_votes, log_total, put_in, take_out
-from atg_fg.learning.kernels import Clusters, TrialArrays, copy_into, draw_by_logarithm
+from atg_fg.learning.kernels import SMALL, Clusters, TrialArrays, copy_into, draw_by_logarithm
 from atg_fg.learning.object_kernels import cluster_weights
-from atg_fg.learning.weight_kernels import trial_weights
+from atg_fg.learning.weight_kernels import side_by_side, sum_products, trial_weights
 
 #: Paths with slips that are followed at once, and how improbable one may be beside the best.
 _MAX_PATHS = 256
 _LEAST_PATH = 1e-7
+#: Products of so many times the greatest may be the greatest but for rounding.
+_AS_GOOD = 1.0 - 1e-9
 
 
 @compiled
@@ -77,6 +79,22 @@ class Paths(NamedTuple):
     log_prior: FloatArray
 
 
+class _Work(NamedTuple):
+    """What is followed along each path. A path keeps its row of the large tables when others are forgotten.
+
+    Attributes:
+        row: Of each path, and those that are free, shape [B].
+        state: Where each path is, shape [B].
+        local: Likelihood of each symbol in each register, by row, shape [B, R, V].
+        totals: Σ_c table(r, c) local(r, c) of each cluster side by side, by row, shape [B, R, K].
+    """
+
+    row: IntArray
+    state: IntArray
+    local: FloatArray
+    totals: FloatArray
+
+
 @compiled
 def slip_paths(
     trials: TrialArrays,
@@ -92,79 +110,122 @@ def slip_paths(
     Returns:
         The paths and ln p(trial, path | cluster), shape [B, C].
     """
-    n_clusters, n_registers, n_symbols = clusters.tables.shape
+    members, tables = side_by_side(clusters, free)
     n_states, length = len(clusters.registers), trials.lengths[trial]
-    log_slip = log_odds - np.log1p(np.exp(log_odds))
-    log_stay = -np.log1p(np.exp(log_odds))
-    capacity = max(2 * _MAX_PATHS, n_states)
-    n_paths = n_states
-    state, start, log_prior = np.arange(capacity), np.arange(capacity), np.zeros(capacity)
-    slipped = np.zeros((capacity, max(length, 1)), np.bool_)
-    local = np.ones((capacity, n_registers, n_symbols))
-    # ln Σ_c table(r, c) local(r, c) of each path, register and cluster; 0 where nothing was seen yet
-    factors = np.zeros((capacity, n_registers, n_clusters))
-    scores = np.full((capacity, n_clusters), -np.inf)
-    prior = cluster_weights(trials, trial, clusters, free, log_new)
+    capacity, n_paths = max(2 * _MAX_PATHS, n_states), n_states
+    paths = Paths(np.zeros((capacity, max(length, 1)), np.bool_), np.arange(capacity), np.zeros(capacity))
+    work = _Work(
+        np.arange(capacity),
+        np.arange(capacity),
+        np.ones((capacity, tables.shape[0], tables.shape[1])),
+        np.ones((capacity, tables.shape[0], len(members))),
+    )
+    all_prior = cluster_weights(trials, trial, clusters, free, log_new)
+    prior, best = np.empty(len(members)), np.empty(capacity)
+    for number in range(len(members)):
+        prior[number] = all_prior[members[number]]
+    weights = np.exp(prior - prior.max())
     for time in range(length):
         if time > 0:
-            n_old = n_paths
-            for path in range(n_old):
-                if n_paths == capacity:
-                    break
-                state[n_paths], start[n_paths] = state[path], start[path]
-                log_prior[n_paths] = log_prior[path] + log_slip
-                for earlier in range(time - 1):
-                    slipped[n_paths, earlier] = slipped[path, earlier]
-                slipped[n_paths, time - 1] = True
-                copy_into(local[n_paths], local[path])
-                copy_into(factors[n_paths], factors[path])
-                n_paths += 1
-            for path in range(n_old):
-                state[path] = clusters.successors[0, done[time - 1], state[path]]
-                log_prior[path] += log_stay
-        peak = -np.inf
+            n_paths = branch(paths, work, n_paths, time, clusters.successors[0, done[time - 1]], log_odds)
         for path in range(n_paths):
-            for slot in range(clusters.registers.shape[1]):
-                register = clusters.registers[state[path], slot]
-                for symbol in range(n_symbols):
-                    local[path, register, symbol] *= trials.looks[trial, time, slot, symbol]
-                for cluster in range(n_clusters):
-                    if clusters.n_trials[cluster] > 0 or cluster == free:
-                        total = 0.0
-                        for symbol in range(n_symbols):
-                            total += clusters.tables[cluster, register, symbol] * local[path, register, symbol]
-                        factors[path, register, cluster] = np.log(max(total, 1e-300))
-            for cluster in range(n_clusters):
-                if clusters.automaton[cluster] == 0 and (clusters.n_trials[cluster] > 0 or cluster == free):
-                    score = log_prior[path] + prior[cluster]
-                    for register in range(n_registers):
-                        score += factors[path, register, cluster]
-                    scores[path, cluster] = score
-                    peak = max(peak, score)
-                else:
-                    scores[path, cluster] = -np.inf
-        best = np.empty(n_paths)
-        for path in range(n_paths):
-            best[path] = scores[path].max()
-        order = np.argsort(-best)
-        n_kept = 0
-        kept = np.empty(n_paths, np.int64)
-        for path in order:
-            if n_kept < _MAX_PATHS and best[path] > peak + np.log(_LEAST_PATH):
-                kept[n_kept] = path
-                n_kept += 1
-        kept = kept[:n_kept]
-        if n_kept < n_paths:
-            old_state, old_start, old_prior = state[kept], start[kept], log_prior[kept]
-            old_local, old_factors = local[kept], factors[kept]
-            for path in range(n_kept):
-                state[path], start[path], log_prior[path] = old_state[path], old_start[path], old_prior[path]
-                copy_into(local[path], old_local[path])
-                copy_into(factors[path], old_factors[path])
-            copy_into(slipped, slipped[kept])
-            copy_into(scores, scores[kept])
-            n_paths = n_kept
-    return Paths(slipped[:n_paths].copy(), start[:n_paths].copy(), log_prior[:n_paths].copy()), scores[:n_paths].copy()
+            take_in_look(trials, trial, time, clusters.registers, tables, work, path)
+            best[path] = best_score(work, path, paths.log_prior[path], prior, weights)
+        n_paths = drop(paths, work, best[:n_paths])
+    scores = np.full((n_paths, len(clusters.n_trials)), -np.inf)
+    for path in range(n_paths):
+        for number in range(len(members)):
+            scores[path, members[number]] = score_of(work, path, number, paths.log_prior[path], prior)
+    return Paths(paths.slipped[:n_paths].copy(), paths.start[:n_paths].copy(), paths.log_prior[:n_paths].copy()), scores
+
+
+@compiled_within
+def branch(paths: Paths, work: _Work, n_paths: int, time: int, successors: IntArray, log_odds: float) -> int:
+    """Let each path go on, and leave another behind for a slip; return how many there are then."""
+    log_slip, log_stay = log_odds - np.log1p(np.exp(log_odds)), -np.log1p(np.exp(log_odds))
+    n_old, slipped, state, row = n_paths, paths.slipped, work.state, work.row
+    for path in range(n_old):
+        if n_paths == len(row):
+            break
+        state[n_paths], paths.start[n_paths] = state[path], paths.start[path]
+        paths.log_prior[n_paths] = paths.log_prior[path] + log_slip
+        for earlier in range(time - 1):
+            slipped[n_paths, earlier] = slipped[path, earlier]
+        slipped[n_paths, time - 1] = True
+        copy_into(work.local[row[n_paths]], work.local[row[path]])
+        copy_into(work.totals[row[n_paths]], work.totals[row[path]])
+        n_paths += 1
+    for path in range(n_old):
+        state[path] = successors[state[path]]
+        paths.log_prior[path] += log_stay
+    return n_paths
+
+
+@compiled_within
+def take_in_look(
+    trials: TrialArrays, trial: int, time: int, registers: IntArray, tables: FloatArray, work: _Work, path: int
+) -> None:
+    """Multiply a look into the registers that a path shows, and sum over symbols for all clusters side by side."""
+    looks, local, row, state = trials.looks, work.local, work.row[path], work.state[path]
+    for slot in range(registers.shape[1]):
+        register = registers[state, slot]
+        for symbol in range(tables.shape[1]):
+            local[row, register, symbol] *= looks[trial, time, slot, symbol]
+        sum_products(tables, register, local[row], register, work.totals, row)
+
+
+@compiled_within
+def best_score(work: _Work, path: int, log_prior: float, prior: FloatArray, weights: FloatArray) -> float:
+    """Return the greatest of the scores of a path, over clusters.
+
+    A logarithm takes longer than all else: it is taken for the clusters alone that may be the best.
+
+    Args:
+        work: What is followed.
+        path: Which one.
+        log_prior: Of its slips.
+        prior: Ln of what each cluster weighs, shape [K].
+        weights: The same as a factor, shape [K].
+    """
+    totals, row, products = work.totals, work.row[path], weights.copy()
+    for register in range(totals.shape[1]):
+        for number in range(len(products)):
+            products[number] *= totals[row, register, number]
+    most, result = products.max(), -np.inf
+    least = most * _AS_GOOD if SMALL < most < 1.0 / SMALL else -1.0
+    for number in range(len(products)):
+        if products[number] >= least:
+            result = max(result, score_of(work, path, number, log_prior, prior))
+    return result
+
+
+@compiled_within
+def score_of(work: _Work, path: int, number: int, log_prior: float, prior: FloatArray) -> float:
+    """Return ln p(trial, path | cluster)."""
+    score = log_prior + prior[number]
+    for register in range(work.totals.shape[1]):
+        score += np.log(max(work.totals[work.row[path], register, number], 1e-300))
+    return float(score)
+
+
+@compiled_within
+def drop(paths: Paths, work: _Work, best: FloatArray) -> int:
+    """Forget paths that are negligible beside the best; return how many are left. These are in order, best first."""
+    n_paths, least, n_kept = len(best), best.max() + np.log(_LEAST_PATH), 0
+    for path in range(n_paths):
+        n_kept += best[path] > least
+    if n_kept == n_paths <= _MAX_PATHS:
+        return n_paths
+    n_kept = min(n_kept, _MAX_PATHS)
+    kept = np.argsort(-best)
+    state, row, start, log_prior = work.state[kept], work.row[kept], paths.start[kept], paths.log_prior[kept]
+    slipped = paths.slipped[kept[:n_kept]]
+    for path in range(n_paths):
+        work.row[path] = row[path]
+    for path in range(n_kept):
+        work.state[path], paths.start[path], paths.log_prior[path] = state[path], start[path], log_prior[path]
+    copy_into(paths.slipped, slipped)
+    return n_kept
 
 
 @compiled
