@@ -47,6 +47,9 @@ class PathFilter:
         self._factors = np.zeros((n_states, n_registers, len(log_weights)))
         #: p(label | symbol) of a label without a confidence, shape [V, V]
         self._labels = noise.wrong * noise.confusion + (1.0 - noise.wrong) * np.eye(alphabet.n_symbols)
+        #: Once asked for after a step: ln p(path, what was seen | object), shape [B, K + 1], and its total over paths
+        self._joint: FloatArray | None = None
+        self._log_evidence: FloatArray | None = None
 
     def copy(self) -> PathFilter:
         """Return a filter that goes on alone from here."""
@@ -58,16 +61,24 @@ class PathFilter:
     @property
     def log_evidence(self) -> FloatArray:
         """Ln p(what was seen | object), shape [K + 1]."""
-        logarithms = self._log_prior[:, None] + self._factors.sum(axis=1)
-        peak = logarithms.max(axis=0)
-        result: FloatArray = peak + np.log(np.exp(logarithms - peak).sum(axis=0))
-        return result
+        if self._log_evidence is None:
+            logarithms = self._log_joint
+            peak = logarithms.max(axis=0)
+            self._log_evidence = peak + np.log(np.exp(logarithms - peak).sum(axis=0))
+        return self._log_evidence
+
+    @property
+    def _log_joint(self) -> FloatArray:
+        if self._joint is None:
+            self._joint = self._log_prior[:, None] + self._factors.sum(axis=1)
+        return self._joint
 
     def act(self, action: AnyAction) -> None:
         """Take in an action: each path goes on, and leaves another behind for a slip.
 
         Where it is not sure what was done, each path goes on in all ways that are possible.
         """
+        self._joint = self._log_evidence = None
         if isinstance(action, UncertainAction):
             self._act_uncertainly(action)
             return
@@ -97,6 +108,7 @@ class PathFilter:
 
     def observe(self, evidence: Evidence) -> None:
         """Take in a look, as labels if it is a detection, else as a likelihood of each slot's symbol."""
+        self._joint = self._log_evidence = None
         if evidence.detection is None and not evidence.slots:
             likelihood = self._alphabet.slot_likelihoods(evidence.likelihood)
         else:
@@ -121,13 +133,13 @@ class PathFilter:
         self.observe(Evidence(np.zeros(0), None, tuple(symbols.tolist())))
 
     def _drop(self) -> None:
-        joint = self._log_prior[:, None] + self._factors.sum(axis=1) + self.log_weights
-        best = joint.max(axis=1)
+        best = (self._log_joint + self.log_weights).max(axis=1)
         order = np.argsort(-best, kind="stable")[:MAX_PATHS]
         kept = np.sort(order[best[order] > best.max() + np.log(NEGLIGIBLE)])
         if len(kept) < len(best):
             self._states, self._local = self._states[kept], self._local[kept]
             self._log_prior, self._factors = self._log_prior[kept], self._factors[kept]
+            self._joint = self._log_joint[kept]
 
     def predicted_patterns(self) -> tuple[IntArray, FloatArray]:
         """Return the owners that matter, shape [I], and p(next pattern | action, owner) of each, shape [A, I, |𝒵|]."""
@@ -193,7 +205,7 @@ class PathFilter:
 
     def _pairs(self) -> tuple[IntArray, IntArray, FloatArray]:
         """Return the paths and owners that matter, ordered by owner, and p(path | owner, what was seen) of each."""
-        joint = self._log_prior[:, None] + self._factors.sum(axis=1) + self.log_weights
+        joint = self._log_joint + self.log_weights
         probability = np.exp(joint - log_sum_exp(joint.ravel()))
         owners, paths = np.nonzero(probability.T > UNIMPORTANT)
         weights = probability[paths, owners]
