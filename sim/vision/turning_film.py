@@ -6,6 +6,7 @@ along the path of a turn. Frame: x points away from the camera, y to its left, z
 
 from __future__ import annotations
 
+import tempfile
 import weakref
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import FloatArray
+from atg_fg.storage.plain_files import write_bytes_atomically
 from atg_fg.worlds.arcube import ACTION_ROTATIONS
 from sim.bodies.cube import CUBE_CENTRE, CUBE_SIZE, CubeBody
 from sim.vision.camera import Camera, Light
@@ -246,25 +248,29 @@ class TurningFilm:
 
 
 def write_video(path: Path, frames: Iterator[NDArray[np.uint8]], rate: float) -> int:
-    """Write RGB frames as a video and return how many there were.
+    """Write RGB frames as a video, whole or not at all, and return how many there were.
 
     Raises:
         InvalidInputError: Another suffix than those of ``CODECS``, or no place that can be written.
     """
     if path.suffix.lower() not in CODECS:
         raise InvalidInputError(f"{path}: suffix {path.suffix!r}; expected one of: {', '.join(CODECS)}")
-    writer: cv2.VideoWriter | None = None
     n_frames = 0
-    for frame in frames:
-        if writer is None:
-            code = cv2.VideoWriter.fourcc(*CODECS[path.suffix.lower()])
-            writer = cv2.VideoWriter(str(path), code, rate, (frame.shape[1], frame.shape[0]))
-            if not writer.isOpened():
-                raise InvalidInputError(f"{path}: cannot be written; expected a path in a folder that can be written")
-        n_frames += 1
-        writer.write(np.asarray(cv2.cvtColor(frame, cv2.COLOR_RGB2BGR)))
-    if writer is not None:
-        writer.release()
+    # OpenCV opens what it writes to by itself, and would wait for who reads from a pipe.
+    with tempfile.TemporaryDirectory(prefix="atg-fg-") as folder:
+        film = Path(folder) / f"film{path.suffix.lower()}"
+        writer: cv2.VideoWriter | None = None
+        for frame in frames:
+            if writer is None:
+                code = cv2.VideoWriter.fourcc(*CODECS[path.suffix.lower()])
+                writer = cv2.VideoWriter(str(film), code, rate, (frame.shape[1], frame.shape[0]))
+                if not writer.isOpened():
+                    raise InvalidInputError(f"{path}: OpenCV cannot write such a video here; expected another suffix")
+            n_frames += 1
+            writer.write(np.asarray(cv2.cvtColor(frame, cv2.COLOR_RGB2BGR)))
+        if writer is not None:
+            writer.release()
+            write_bytes_atomically(path, film.read_bytes())
     return n_frames
 
 

@@ -1,9 +1,14 @@
+import os
+from concurrent.futures import ThreadPoolExecutor
+
 import numpy as np
 import pytest
 
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.senses.tags import TagDetector, Tags
 from atg_fg.senses.turns import CubeAtRest, CubeTakenAway, TurnWatcher
+from atg_fg.senses.video import FrameSource
+from atg_fg.storage import named_pipes
 from atg_fg.worlds.arcube import ACTION_ROTATIONS
 from sim.bodies.cube import TAG_SIZE, face_image
 from sim.vision.turning_film import TurningFilm, Webcam, write_video
@@ -65,3 +70,35 @@ def test_the_same_seed_films_the_same():
 def test_another_suffix_is_refused(tmp_path):
     with pytest.raises(InvalidInputError, match=r"film\.doc: suffix '\.doc'; expected one of: \.avi, \.mp4"):
         write_video(tmp_path / "film.doc", iter([]), 10)
+
+
+FRAMES = [np.full((48, 64, 3), level, dtype=np.uint8) for level in (0, 100, 200)]
+
+
+@pytest.mark.parametrize("suffix", [".avi", ".mp4", ".AVI"])
+def test_a_pipe_without_a_reader_is_given_up_and_one_with_a_reader_gets_the_film(tmp_path, monkeypatch, suffix):
+    monkeypatch.setattr(named_pipes, "PIPE_WAIT", 0.2)
+    path = tmp_path / f"100%03d{suffix}"
+    os.mkfifo(path)
+    with pytest.raises(InvalidInputError, match="a pipe from which no one reads"):
+        write_video(path, iter(FRAMES), 10)
+    with ThreadPoolExecutor(1) as executor:
+        read = executor.submit(path.read_bytes)
+        assert write_video(path, iter(FRAMES), 10) == 3
+        (tmp_path / "film.avi").write_bytes(read.result())
+    with FrameSource("video", tmp_path / "film.avi") as frames:
+        assert [round(float(frame.image.mean()) / 100) for frame in frames] == [0, 1, 2]
+
+
+def test_a_film_that_is_broken_off_leaves_the_old_one(tmp_path):
+    path = tmp_path / "film.avi"
+    path.write_bytes(b"old")
+
+    def broken_off():
+        yield FRAMES[0]
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_video(path, broken_off(), 10)
+    assert path.read_bytes() == b"old"
+    assert os.listdir(tmp_path) == ["film.avi"]
