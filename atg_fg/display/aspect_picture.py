@@ -140,7 +140,8 @@ def _draw_tiles(
         corner = low + np.array([number * side, 0.0])
         right, up = np.array([side, 0.0]), np.array([0.0, side])
         _draw_symbol(axes, corner, right, up, symbol, _text(alphabet, symbol), images, look)
-        axes.annotate(slot, (corner[0] + side / 2, corner[1] + side + 0.05), ha="center", fontsize=6.5, color=GREY)
+        middle = corner[0] + side / 2, corner[1] + side + 0.05
+        axes.annotate(slot, middle, ha="center", fontsize=6.5, color=GREY, parse_math=False)
     return low, low + np.array([side * len(symbols), side])
 
 
@@ -182,4 +183,6 @@ def _draw_symbol(
     else:
         middle = corner + (right + up) / 2
         size = min(13.0, 42.0 / len(text))
-        axes.annotate(text, tuple(middle), ha="center", va="center", fontsize=size, color=look.ink, zorder=5)
+        axes.annotate(
+            text, tuple(middle), ha="center", va="center", fontsize=size, color=look.ink, zorder=5, parse_math=False
+        )

@@ -17,6 +17,7 @@ from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import FloatArray
 from atg_fg.display.aspect_picture import INCHES_PER_UNIT, Images, action_color, draw_arrow, draw_aspect, draw_frame
 from atg_fg.display.figures import GREY, figure_class, plot_style
+from atg_fg.display.plot_parts import say_as_it_is
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -155,3 +156,4 @@ def _draw_legend(figure: Figure, graph: AspectTransitionGraph) -> None:
     handles.append(Line2D([], [], color=GREY, linewidth=1.3, linestyle=(0, (1, 2)), label="not yet tried"))
     legend = figure.legend(handles=handles, loc="upper center", ncols=len(handles), title=graph.name, fontsize=9)
     legend.get_title().set_fontweight("bold")
+    say_as_it_is(legend)

@@ -10,7 +10,7 @@ import numpy as np
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import FloatArray
 from atg_fg.display.figures import PALETTE, plot_style
-from atg_fg.display.plot_parts import figure_with_axes
+from atg_fg.display.plot_parts import figure_with_axes, say_as_it_is
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -62,6 +62,5 @@ def plot_comparison(records: Mapping[str, Compared], *, title: str = "Error agai
         axes.set_ylabel("total variation to exact inference")
         axes.set_ylim(bottom=min(0.0, -0.03 * axes.get_ylim()[1]))
         axes.set_title(title, parse_math=False)
-        for text in figure.legend(loc="outside right center", fontsize=8).get_texts():
-            text.set_parse_math(False)
+        say_as_it_is(figure.legend(loc="outside right center", fontsize=8))
     return figure

@@ -12,6 +12,7 @@ from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import FloatArray, PatternAlphabet
 from atg_fg.display.aspect_picture import INCHES_PER_UNIT, Images, Look, action_color, draw_arrow, draw_aspect
 from atg_fg.display.figures import GREY, INK, figure_class, plot_style
+from atg_fg.display.plot_parts import say_as_it_is
 from atg_fg.display.ring_layout import Node, ring_layout
 from atg_fg.learning.completion import OBSERVED, PREDICTED, UNKNOWN, CompletedGraph, statuses
 
@@ -163,6 +164,4 @@ def _draw_head(figure: Figure, graph: CompletedGraph, assumptions: Assumptions) 
         handles.append(Line2D([], [], color=GREY, linewidth=1.0, linestyle=_DASHED, label=label))
     legend = figure.legend(handles=handles, loc="upper center", ncols=len(handles), title=title, fontsize=9)
     legend.get_title().set_fontweight("bold")
-    legend.get_title().set_parse_math(False)
-    for text in legend.get_texts():
-        text.set_parse_math(False)
+    say_as_it_is(legend)

@@ -13,6 +13,7 @@ from atg_fg.display.figures import figure_class
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.legend import Legend
 
 
 class LineEnd(NamedTuple):
@@ -83,5 +84,10 @@ def legend_above(axes: Axes) -> None:
         loc="lower left", bbox_to_anchor=(-0.01, 1.0), ncols=6, borderpad=0.2, handletextpad=0.3,
         columnspacing=1.2, numpoints=1,
     )  # fmt: skip
-    for text in legend.get_texts():
+    say_as_it_is(legend)
+
+
+def say_as_it_is(legend: Legend) -> None:
+    """Let the names in a legend be no formulas, whatever dollars they hold."""
+    for text in (legend.get_title(), *legend.get_texts()):
         text.set_parse_math(False)

@@ -11,7 +11,7 @@ from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import FloatArray
 from atg_fg.core.statistics import wilson_interval
 from atg_fg.display.figures import GREY, INK, PALETTE, figure_class, plot_style
-from atg_fg.display.plot_parts import LineEnd, figure_with_axes, label_ends, plot_curve
+from atg_fg.display.plot_parts import LineEnd, figure_with_axes, label_ends, plot_curve, say_as_it_is
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -136,7 +136,7 @@ def plot_ablation(entries: Sequence[Mapping[str, Any]]) -> Figure:
         for axes in all_axes[len(panels) :]:
             axes.remove()
         lines = [line for line in all_axes[0].get_lines() if line.get_marker() not in ("", "None", None)]
-        figure.legend(lines, variants, loc="outside lower center", ncols=len(variants))
+        say_as_it_is(figure.legend(lines, variants, loc="outside lower center", ncols=len(variants)))
     return figure
 
 
