@@ -39,6 +39,8 @@ class Assumptions:
         for field in ("n_objects", "n_aspects"):
             object.__setattr__(self, field, whole_number(getattr(self, field), field, 1, MAX_NUMBER))
         object.__setattr__(self, "actions", distinct_names(self.actions, "actions"))
+        if not isinstance(self.alphabet, PatternAlphabet):
+            raise InvalidInputError(f"alphabet: {brief(self.alphabet)}; expected a PatternAlphabet")
         if self.n_aspects > len(self.alphabet):
             raise InvalidInputError(
                 f"n_aspects: {self.n_aspects}; expected at most the {len(self.alphabet)} patterns there are, "

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence, Set
 from typing import Any, Final
 
 import numpy as np
@@ -108,6 +108,14 @@ def distinct_names(value: Any, place: str) -> tuple[str, ...]:
     if not is_sequence or not value or not all(isinstance(name, str) for name in value) or len(set(value)) < len(value):
         raise InvalidInputError(f"{place}: {brief(value)}; expected at least one name, all different")
     return tuple(value)
+
+
+def sequence(value: Any, place: str) -> Sequence[Any]:
+    """Return ``value``, or raise ``InvalidInputError`` unless it has a length and an order, and is no text."""
+    if isinstance(value, (str, bytes, Mapping, Set)) or not (hasattr(value, "__len__") and hasattr(value, "__iter__")):
+        raise InvalidInputError(f"{place}: {brief(value)}; expected a sequence")
+    found: Sequence[Any] = value
+    return found
 
 
 def plain_text(value: Any, place: str) -> str:

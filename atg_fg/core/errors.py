@@ -50,5 +50,7 @@ class WorkerLostError(AtgError, RuntimeError):
 
 def unknown_name(kind: str, name: object, known: Iterable[object]) -> UnknownNameError:
     """Return the error for ``name`` missing from a registry, listing the names ``known`` there."""
+    from atg_fg.core.checks import brief  # which has errors of this module
+
     names = ", ".join(sorted(map(str, known)))
-    return UnknownNameError(f"{kind}: unknown name {name!r}; expected one of: {names}")
+    return UnknownNameError(f"{kind}: unknown name {brief(name)}; expected one of: {names}")

@@ -8,7 +8,7 @@ from typing import Final
 
 from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.assumptions import Assumptions
-from atg_fg.core.checks import plain_text
+from atg_fg.core.checks import brief, plain_text, sequence
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.merging import Merge, check_merges
 from atg_fg.core.object_sense import Moments
@@ -42,6 +42,8 @@ class RobotMemory(Persistent):
         merges: Iterable[Merge] = (),
         sense: Sense | None = None,
     ) -> None:
+        if not isinstance(assumptions, Assumptions):
+            raise InvalidInputError(f"memory: {brief(assumptions)}; expected Assumptions")
         self.assumptions = assumptions
         self.sense = sense
         self._graphs: dict[str, AspectTransitionGraph] = {}
@@ -97,6 +99,7 @@ class RobotMemory(Persistent):
             InvalidInputError: Lengths or indices that do not fit, a novel object of which no pattern was seen whole, a
                 name that is taken, or what is no reading.
         """
+        patterns, actions = sequence(patterns, "learn: patterns"), sequence(actions, "learn: actions")
         if matched is None and all(pattern is None for pattern in patterns):
             raise InvalidInputError("learn: no pattern was seen whole; expected at least one of a novel object")
         if matched is None:
@@ -218,9 +221,11 @@ class RobotMemory(Persistent):
 
     def _free_name(self, name: str | None) -> str:
         """Return a name for a new ATG: the one that is wanted, if it is free."""
-        if name is not None and (name in self._graphs or name in self._dropped):
-            raise InvalidInputError(f"memory: name {name!r} is taken; expected one that no ATG has or had")
-        return self._new_name() if name is None else name
+        if name is None:
+            return self._new_name()
+        if plain_text(name, "name") in self._graphs or name in self._dropped:
+            raise InvalidInputError(f"memory: name {brief(name)} is taken; expected one that no ATG has or had")
+        return name
 
     def _new_name(self) -> str:
         number = len(self)
@@ -339,7 +344,7 @@ class RobotMemory(Persistent):
     def __getitem__(self, name: str) -> AspectTransitionGraph:
         try:
             return self._graphs[name]
-        except KeyError:
+        except (KeyError, TypeError):  # what cannot be hashed is no name
             raise unknown_name("memory", name, self._graphs) from None
 
     def __len__(self) -> int:

@@ -16,7 +16,7 @@ from typing import Any, Final, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from atg_fg.core.checks import brief, distinct_names, listed, whole_number
+from atg_fg.core.checks import brief, distinct_names, listed, plain_text, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.slot_checks import check_confidences, check_slots
 
@@ -51,9 +51,8 @@ MISSING: Final = -1
 #: a few of them are still numbers.
 LEAST_SHARE: Final = 1e-100
 
-
 MAX_PATTERNS: Final = 100_000
-
+MAX_SLOTS: Final = 16  # two symbols in more make more patterns
 
 #: Patterns up to which evidence of each of them is kept: 8 MB of weights.
 _MOST_KEPT: Final = 1000
@@ -114,10 +113,10 @@ class PatternAlphabet:
         n_patterns = 1
         for slot in range(len(self.slots)):
             n_patterns *= self.n_symbols - slot if self.exclusive else self.n_symbols
-            if n_patterns > MAX_PATTERNS:
+            if n_patterns > MAX_PATTERNS or slot == MAX_SLOTS:
                 raise InvalidInputError(
-                    f"n_symbols: {self.n_symbols} symbols in {len(self.slots)} slots make too many patterns; "
-                    f"expected at most {MAX_PATTERNS}"
+                    f"n_symbols: {brief(self.n_symbols)} symbols in {len(self.slots)} slots make too many patterns; "
+                    f"expected at most {MAX_PATTERNS}, and {MAX_SLOTS} slots"
                 )
 
     @classmethod
@@ -125,14 +124,18 @@ class PatternAlphabet:
         cls, slots: Sequence[str], names: Sequence[str], *, exclusive: bool = True, is_open: bool = False
     ) -> PatternAlphabet:
         """Return the alphabet of the symbols with these names; for the rest see the class."""
-        return cls(tuple(slots), len(names), exclusive, tuple(names), is_open)
+        known = distinct_names(names, "names of symbols")
+        return cls(distinct_names(slots, "slots"), len(known), exclusive, known, is_open)
 
     def extended(self, names: Iterable[str]) -> PatternAlphabet:
         """Return an open alphabet with those of the names that it lacks, after its own.
 
         Raises:
-            InvalidInputError: The alphabet is not open, and lacks one.
+            InvalidInputError: The alphabet is not open, and lacks one; or one is no name.
         """
+        if isinstance(names, str) or not isinstance(names, Iterable):
+            raise InvalidInputError(f"names of symbols: {brief(names)}; expected names")
+        names = [plain_text(name, "name of a symbol") for name in names]
         new = [name for name in dict.fromkeys(names) if name not in self._number_of]
         if new and not self.is_open:
             raise InvalidInputError(f"symbol {brief(new[0])}; expected one of: {listed(self.names)}")
@@ -228,7 +231,8 @@ class PatternAlphabet:
             if isinstance(symbol, (bool, np.bool_)) or not isinstance(symbol, (int, np.integer)):
                 raise InvalidInputError(f"{place}, slot {slot!r}: {brief(symbol)}; expected a whole number or null")
             if not 0 <= symbol < self.n_symbols:
-                raise InvalidInputError(f"{place}, slot {slot!r}: symbol {symbol}; expected 0 to {self.n_symbols - 1}")
+                found = brief(symbol)
+                raise InvalidInputError(f"{place}, slot {slot!r}: symbol {found}; expected 0 to {self.n_symbols - 1}")
             if self.exclusive and int(symbol) in symbols:
                 raise InvalidInputError(f"{place}, slot {slot!r}: symbol {symbol} is repeated; expected all different")
             symbols.append(int(symbol))
@@ -353,8 +357,8 @@ class Evidence:
         """
         try:
             evidence = cls(np.array(likelihood, dtype=np.float64))
-        except (TypeError, ValueError) as error:
-            raise InvalidInputError(f"evidence: {likelihood!r}; expected numbers") from error
+        except (TypeError, ValueError, OverflowError) as error:
+            raise InvalidInputError(f"evidence: {brief(likelihood)}; expected numbers") from error
         evidence.check(len(alphabet))
         if not evidence.likelihood.any():
             raise InvalidInputError("evidence: all zero; expected at least one pattern that it is possible under")

@@ -10,9 +10,11 @@ import numpy as np
 
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.belief import IdentityBelief
+from atg_fg.core.checks import brief, sequence
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.look_info import confidences_in, confidences_of, pattern_to_learn, truth_of
-from atg_fg.core.patterns import Confidences, Detection, Evidence, FloatArray
+from atg_fg.core.looks import Look, evidence_of
+from atg_fg.core.patterns import Confidences, Detection, FloatArray
 from atg_fg.core.table import Bar, Cell, Table, shortened
 
 #: How a trial can end.
@@ -101,26 +103,30 @@ class TrialRecord:
 
     @classmethod
     def from_looks(
-        cls, assumptions: Assumptions, looks: Sequence[Evidence], actions: Sequence[int | str], name: str | None = None
+        cls, assumptions: Assumptions, looks: Sequence[Look], actions: Sequence[int | str], name: str | None = None
     ) -> TrialRecord:
         """Return the record of a trial that nobody inferred anything from: what was seen and done is all there is.
 
         Args:
             assumptions: Of the memory that is to learn from it.
-            looks: Evidence of each look, at least one, t + 1 of them.
+            looks: Each look, as evidence or as ``Inference.observe`` takes it, at least one, t + 1 of them.
             actions: What was done between each two, index or name, t of them.
             name: Of the object, if it is known; it is then the belief at each look, else *unseen* is.
 
         Raises:
             InvalidInputError: Lengths that do not fit, an action that there is not, or evidence over another alphabet.
         """
-        if not looks or len(actions) != len(looks) - 1:
-            raise InvalidInputError(f"trial: {len(looks)} looks, {len(actions)} actions; expected one look more")
+        if not isinstance(assumptions, Assumptions):
+            raise InvalidInputError(f"trial: {brief(assumptions)}; expected Assumptions")
+        n_looks, n_actions = len(sequence(looks, "trial: looks")), len(sequence(actions, "trial: actions"))
+        if not n_looks or n_actions != n_looks - 1:
+            raise InvalidInputError(f"trial: {n_looks} looks, {n_actions} actions; expected one look more")
         belief = IdentityBelief.of(
             np.array([1.0, 0.0] if name else [1.0]), max(assumptions.n_objects - (name is not None), 1)
         )
         record = cls(() if name is None else (name,), assumptions)
-        for time, evidence in enumerate(looks):
+        for time, look in enumerate(looks):
+            evidence = evidence_of(assumptions.alphabet, look, assumptions.object_senses)
             evidence.check(len(assumptions.alphabet))
             action = None if time == len(actions) else assumptions.action_of(actions[time], f"trial, action {time}")
             seen = evidence.detection or (None,) * len(assumptions.alphabet.slots)

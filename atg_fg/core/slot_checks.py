@@ -9,7 +9,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import ArrayLike
 
-from atg_fg.core.checks import brief
+from atg_fg.core.checks import brief, sequence
 from atg_fg.core.errors import InvalidInputError
 
 #: Greatest weight of a slot, and its inverse the least, that is left on its scale: products of 16 are still numbers.
@@ -24,7 +24,7 @@ def check_slots(
     None at all are as good. Only their ratios count: those of a slot whose greatest is beyond what can be multiplied
     are divided by it.
     """
-    if len(likelihoods) not in (0, len(slots)):
+    if len(sequence(likelihoods, place)) not in (0, len(slots)):
         raise InvalidInputError(f"{place}: {len(likelihoods)}; expected one for each of {len(slots)} slots, or none")
     result: list[tuple[float, ...] | None] = []
     for slot, given in zip(slots, likelihoods, strict=False):
@@ -34,7 +34,7 @@ def check_slots(
         where = f"{place}, slot {slot!r}"
         try:
             weights = np.array(given, dtype=np.float64)
-        except (TypeError, ValueError) as error:
+        except (TypeError, ValueError, OverflowError) as error:
             raise InvalidInputError(f"{where}: {brief(given)}; expected numbers") from error
         if weights.shape != (n_symbols,):
             raise InvalidInputError(
@@ -54,7 +54,7 @@ def check_confidences(
     confidences: Sequence[float | None], n_slots: int, place: str = "confidences"
 ) -> tuple[float | None, ...]:
     """Return confidences as a tuple, or raise ``InvalidInputError`` naming ``place``; none at all are as good."""
-    if len(confidences) not in (0, n_slots):
+    if len(sequence(confidences, place)) not in (0, n_slots):
         raise InvalidInputError(f"{place}: {len(confidences)}; expected one for each of {n_slots} slots, or none")
     for value in confidences:
         is_number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)

@@ -8,6 +8,7 @@ from importlib import import_module
 from typing import Any, Final
 
 from atg_fg.core.belief import IdentityBelief
+from atg_fg.core.checks import brief
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
@@ -85,7 +86,7 @@ def engine_for(engine: str | type[Inference], parameters: ModelParameters | None
     if isinstance(engine, str) and engine not in ENGINES and ":" not in engine:
         raise unknown_name("engine", engine, ENGINES)
     if not isinstance(engine, str):
-        found = _as_engine(engine, repr(engine))
+        found = _as_engine(engine, brief(engine))
     else:
         found = ENGINES[engine] if engine in ENGINES else _as_engine(imported("engine", engine), engine)
     if parameters is not None and parameters.learn_structure and not found.knows_structure:
@@ -97,7 +98,7 @@ def engine_for(engine: str | type[Inference], parameters: ModelParameters | None
 def _as_engine(found: Any, name: str) -> type[Inference]:
     if not (isinstance(found, type) and issubclass(found, Inference)):
         raise InvalidInputError(
-            f"engine {name!r}: {found!r}; expected a subclass of atg_fg.inference.interface.Inference"
+            f"engine {name!r}: {brief(found)}; expected a subclass of atg_fg.inference.interface.Inference"
         )
     if inspect.isabstract(found):
         missing = ", ".join(sorted(found.__abstractmethods__))
@@ -126,6 +127,10 @@ def begin_trial(
         InvalidInputError: The engine does not know of structures that objects share, has no such option, or does not
             take this value; or the prior is not a distribution over the objects of this memory.
     """
+    if not isinstance(memory, RobotMemory):
+        raise InvalidInputError(f"memory: {brief(memory)}; expected a RobotMemory")
+    if not isinstance(parameters, ModelParameters):
+        raise InvalidInputError(f"parameters: {brief(parameters)}; expected ModelParameters")
     begin: Callable[..., Inference] = (found := engine_for(engine, parameters))
     check_known(found, found.name, options)
     inference = begin(TrialSetup(memory, parameters, prior), **options)

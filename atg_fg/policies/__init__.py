@@ -62,6 +62,8 @@ def make_policy(name: str, entropy_threshold: float | None = None) -> Policy:
 
 
 def _policy(name: str) -> Policy:
+    if not isinstance(name, str):
+        raise unknown_name("policy", name, POLICIES)
     if name in POLICIES:
         return POLICIES[name]()
     others = registered("atg_fg.policies")

@@ -68,6 +68,8 @@ def preset(name: str) -> ModelParameters:
         UnknownNameError: No preset has this name.
         InvalidInputError: The file cannot be read or is no preset.
     """
+    if not isinstance(name, str):
+        raise unknown_name("preset", name, PRESETS)
     if name.endswith(".json"):
         return read_preset(read_text_file(name), name)
     if name not in PRESETS:

@@ -71,6 +71,8 @@ def _spec(value: Any, place: str, keys: tuple[str, ...] = ()) -> RecordingSpec:
     numbers = {
         key: whole_number(fields[key], f"{place}: {key}", least=1) for key in ("objects", "aspects") if key in fields
     }
+    if names.get("slots") == ():
+        raise InvalidInputError(f"{place}: slots: []; expected at least one")
     exclusive = fields.get("exclusive")
     if exclusive is not None and not isinstance(exclusive, bool):
         raise InvalidInputError(f"{place}: exclusive: {brief(exclusive)}; expected true or false")
@@ -94,8 +96,9 @@ def _senses(value: Any, place: str) -> tuple[ObjectSense | str, ...]:
 
 
 def _names(values: Sequence[Any], place: str) -> tuple[str, ...]:
-    """Return names, or raise ``InvalidInputError`` unless they are texts, at least one, all different."""
-    return distinct_names([plain_text(name, f"{place}[{index}]") for index, name in enumerate(values)], place)
+    """Return names, or raise ``InvalidInputError`` unless they are texts, all different; there may be none."""
+    names = [plain_text(name, f"{place}[{index}]") for index, name in enumerate(values)]
+    return distinct_names(names, place) if names else ()
 
 
 def merged_spec(*specs: RecordingSpec) -> RecordingSpec:

@@ -310,7 +310,8 @@ def _text(value: Any, place: str) -> str:
         value = value.item()
     if isinstance(value, bool) or not isinstance(value, (str, int)) or len(str(value)) > _LONGEST:
         raise InvalidInputError(f"{place}: {brief(value)}; expected a name or a whole number")
-    return str(value).strip()
+    text = str(value).strip()
+    return plain_text(text, place) if text else ""
 
 
 def _confidence(value: Any, place: str) -> float:

@@ -6,7 +6,7 @@ from typing import Final, TypeAlias
 
 import numpy as np
 
-from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.checks import whole_number
 from atg_fg.core.patterns import FloatArray
 
 FACES: Final = ("front", "back", "left", "right", "top", "bottom")
@@ -95,8 +95,7 @@ def make_arcubes(n: int, seed: int) -> tuple[Cube, ...]:
         InvalidInputError: ``n`` is negative or more than the 27,720 cubes there are.
     """
     n_distinct = 12 * 11 * 10 * 9 * 8 * 7 // len(ORIENTATIONS)
-    if not 0 <= n <= n_distinct:
-        raise InvalidInputError(f"number of ARcubes: {n}; expected 0 to {n_distinct}, the distinct ones there are")
+    n = whole_number(n, "number of ARcubes, of which all are distinct", 0, n_distinct)
     rng = np.random.default_rng(seed)
     cubes: dict[Cube, Cube] = {}
     while len(cubes) < n:

@@ -59,7 +59,7 @@ def make_world(name: str, /, **options: Any) -> World:
         UnknownNameError: No world has this name.
         MissingDependencyError: The world needs an extra that is not installed.
     """
-    if name not in WORLDS and ":" not in name:
+    if not isinstance(name, str) or (name not in WORLDS and ":" not in name):
         raise unknown_name("world", name, WORLDS)
     for option in _NOT_OPTIONS & options.keys():
         raise InvalidInputError(f"world {name!r}: option {option!r}: expected an option of the world's own")

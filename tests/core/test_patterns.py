@@ -76,6 +76,12 @@ def test_a_detection_agrees_with_all_patterns_that_have_what_was_seen(detection,
     assert evidence.pattern == pattern
 
 
+def test_slots_are_bounded_even_where_there_is_one_symbol_alone() -> None:
+    assert len(PatternAlphabet(tuple(map(str, range(16))), 1, exclusive=False)) == 1
+    with pytest.raises(InvalidInputError, match=r"1 symbols in 17 slots make too many patterns; .* and 16 slots"):
+        PatternAlphabet(tuple(map(str, range(17))), 1, exclusive=False)
+
+
 def test_seeing_one_tag_of_an_arcube_leaves_eleven_patterns() -> None:
     assert Evidence.of_detection(ARCUBE, (None, 4)).likelihood.sum() == 11
 

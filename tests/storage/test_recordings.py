@@ -305,7 +305,7 @@ def test_a_fault_is_one_line_that_says_where_and_what_was_expected(written, chan
         (b"trial,step,action,label\n0,0,,\xff\n", "line 2: byte 0xff, not UTF-8; expected a UTF-8 text file"),
         ("trial,step,action,label\n0,0,\n", "line 2: 3 columns; expected 4"),
         ('\n\n{"format": "other"}', "line 3: format: 'other'"),
-        ('{"format": "atg-fg/recording", "version": 1, "slots": []}', "slots: .*; expected at least one name"),
+        ('{"format": "atg-fg/recording", "version": 1, "slots": []}', "slots: .*; expected at least one"),
         ('{"format": "atg-fg/recording", "version": 1, "slots": ["a", "a"]}', "slots: .*all different"),
         ('{"format": "atg-fg/recording", "version": 1, "slots": ["a"], "labels": ["b", "b"]}', "labels: .*different"),
         ('{"format": "atg-fg/recording", "version": 1, "slots": ["a"], "actions": ["b", "b"]}', "actions: .*different"),
@@ -352,6 +352,13 @@ def test_a_faulty_line_is_named(written, line, message):
         read_recording(written(f"{json.dumps(header)}\n{json.dumps(line)}\n", "looks.jsonl"))
     with pytest.raises(InvalidInputError, match=f"line 4.*{message}"):
         read_recording(written(f"{json.dumps(header)}\n\n\n{json.dumps(line)}\n", "looks.jsonl"))
+
+
+def test_lists_without_names_say_nothing(written):
+    header = {"format": "atg-fg/recording", "version": 1, "slots": ["label"], "actions": [], "labels": []}
+    trial = {"trial": 0, "actions": [], "looks": [[None]]}
+    recording = read_recording(written(f"{json.dumps(header)}\n{json.dumps(trial)}\n", "looks.jsonl"))
+    assert (recording.actions, recording.labels) == (("wait",), ("nothing",))
 
 
 def test_a_closed_alphabet_closes_likelihoods_too(written):

@@ -204,6 +204,12 @@ def test_what_is_not_there_is_one_line(bag, topics, text, change, message):
         read_bag(path, topics(**{"slots": {"label": LABEL}, "action": DID, **change}))
 
 
+def test_half_a_character_is_no_name(bag, topics, text):
+    path = bag([text("/seen", json.dumps({"name": "\ud800"})), text("/did", "turn"), text("/seen", '{"name": "lid"}')])
+    with pytest.raises(InvalidInputError, match=r"message 0 of /seen: .*expected a text of whole characters"):
+        read_bag(path, topics(slots={"label": {"topic": "/seen", "label": "data.name"}}, action=DID))
+
+
 def test_an_unknown_type_is_one_line(bag, topics, text):
     path = bag([text("/seen", "logo"), text("/did", "turn")])
     meta = path / "metadata.yaml"
