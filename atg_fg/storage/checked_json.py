@@ -15,7 +15,7 @@ from typing import Any, Final, NoReturn
 import numpy as np
 
 from atg_fg.core.checks import brief, plain_text
-from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.errors import InvalidInputError, UnknownNameError
 
 #: Levels of lists and objects in what a file may say freely, such as the truth of a look.
 MAX_DEPTH: Final = 20
@@ -121,8 +121,8 @@ def check_format(document: dict[str, Any], name: str, place: str, newest: int = 
 
 @contextmanager
 def placed(place: str) -> Iterator[None]:
-    """Put a place in front of the message of an ``InvalidInputError`` raised inside."""
+    """Put a place in front of the message of an error about input or a name that is raised inside."""
     try:
         yield
-    except InvalidInputError as error:
-        raise InvalidInputError(f"{place}: {error}") from error
+    except (InvalidInputError, UnknownNameError) as error:
+        raise type(error)(f"{place}: {error}") from error

@@ -72,5 +72,7 @@ def test_a_calibration_that_is_none_is_refused_with_its_place(tmp_path, changed,
     ],
 )
 def test_tags_that_cannot_be_are_refused(tmp_path, changed, message):
-    with pytest.raises(AtgError, match=message):
-        read_tags(saved(tmp_path, write_tags(TAGS), **changed))
+    path = saved(tmp_path, write_tags(TAGS), **changed)
+    with pytest.raises(AtgError, match=message) as error:
+        read_tags(path)
+    assert str(path) in str(error.value)
