@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import FloatArray
 from atg_fg.senses.opencv import cv2
-from atg_fg.senses.tags import DICTIONARIES, check_ids, checked_distortion, checked_intrinsics, dictionary_name
+from atg_fg.senses.tags import DICTIONARIES, SIZES, check_ids, checked_distortion, checked_intrinsics, dictionary_name
 
 #: Pictures that show the board, at least.
 LEAST_PICTURES: Final = 5
@@ -92,8 +92,11 @@ class CalibrationBoard:
         object.__setattr__(self, "dictionary", dictionary_name(self.dictionary))
         if min(self.columns, self.rows) < 3:
             raise InvalidInputError(f"board: {self.columns} by {self.rows} squares; expected at least 3 by 3")
-        if not 0 < self.tag < self.square < math.inf:
-            raise InvalidInputError(f"board: squares of {self.square} m, tags of {self.tag} m; expected smaller tags")
+        if not SIZES[0] <= self.square / 5 <= self.tag < self.square <= SIZES[1]:
+            raise InvalidInputError(
+                f"board: squares of {self.square} m, tags of {self.tag} m; expected smaller tags, of a fifth at least, "
+                f"and from {SIZES[0]:g} to {SIZES[1]:g} m"
+            )
         check_ids(self.dictionary, range(self.columns * self.rows // 2), "tags of the board")
 
     def image(self, pixels_a_square: int) -> NDArray[np.uint8]:

@@ -19,6 +19,8 @@ from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.patterns import Evidence, FloatArray, PatternAlphabet
 from atg_fg.senses.opencv import cv2
 
+#: Sides of tags and squares that are measured in numbers that OpenCV can work with, metres.
+SIZES: Final = (1e-4, 1e3)
 #: OpenCV's dictionaries of tags by name; ``DICT_`` before a name, and lower case, are taken too.
 DICTIONARIES: Final[dict[str, int]] = {
     name.removeprefix("DICT_").upper(): getattr(cv2.aruco, name)
@@ -110,8 +112,10 @@ class Tags:
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "dictionary", dictionary_name(self.dictionary))
-        if not 0 < self.size < np.inf:
-            raise InvalidInputError(f"size of tags: {self.size!r}; expected metres above 0")
+        if not SIZES[0] <= self.size <= SIZES[1]:
+            raise InvalidInputError(
+                f"size of tags: {self.size!r}; expected metres above 0, from {SIZES[0]:g} to {SIZES[1]:g}"
+            )
         if self.intrinsics is not None:
             checked_intrinsics(self.intrinsics)
         if self.distortion is not None:

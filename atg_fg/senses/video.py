@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import queue
 import subprocess
@@ -11,7 +10,7 @@ from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
-from threading import Thread
+from threading import TIMEOUT_MAX, Thread
 from typing import IO, Final, Literal, TypeAlias
 
 import numpy as np
@@ -60,8 +59,10 @@ class FrameSource:
     """
 
     def __init__(self, source: Source, name: int | str | Path, timeout: float = TIMEOUT) -> None:
-        if not 0 < timeout < math.inf:
-            raise InvalidInputError(f"time-out of a camera: {timeout!r}; expected seconds above 0")
+        if not 0 < timeout <= TIMEOUT_MAX:
+            raise InvalidInputError(
+                f"time-out of a camera: {timeout!r}; expected seconds above 0, at most {TIMEOUT_MAX:g}"
+            )
         self.place = f"{source} {name}" if source == "camera" else str(name)
         _check_name(source, str(name))
         self.timeout = timeout

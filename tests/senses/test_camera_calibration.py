@@ -90,7 +90,8 @@ def test_a_field_of_view_that_is_none_is_refused(angle):
     ("arguments", "message"),
     [
         ({"columns": 2}, "board: 2 by 5 squares; expected at least 3 by 3"),
-        ({"tag": 0.04}, "expected smaller tags"),
+        *(({"tag": tag}, "expected smaller tags") for tag in (0.04, 0.001, 1e-320, -0.02, float("nan"))),
+        *(({"square": square}, "expected smaller tags") for square in (0.026, 1.0, 1e308, float("inf"), float("nan"))),
         ({"columns": 30, "rows": 30}, "tags of the board: 50; expected 0 to 49"),
     ],
 )

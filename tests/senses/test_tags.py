@@ -214,6 +214,8 @@ def test_the_tag_that_faces_a_direction_best_is_taken():
     [
         ({"size": 0}, "size of tags: 0; expected metres above 0"),
         ({"size": float("nan")}, "size of tags: nan; expected metres above 0"),
+        ({"size": 1e-320}, "size of tags: 1e-320; expected metres above 0, from 0.0001 to 1000"),
+        ({"size": 1e300}, r"size of tags: 1e\+300; expected metres above 0, from 0.0001 to 1000"),
         ({"symbols": {50: 0}}, "tag ids: 50; expected 0 to 49, those of 5X5_50"),
         ({"symbols": {1: 0, 2: 0}}, "expected another symbol for each id"),
         ({"intrinsics": np.eye(2)}, "expected a camera matrix of 3 by 3 numbers"),

@@ -106,7 +106,7 @@ def test_a_name_that_cannot_be_is_refused_at_once(source, name, message):
         FrameSource(source, name)
 
 
-@pytest.mark.parametrize("timeout", [0, -1, float("inf"), float("nan")])
+@pytest.mark.parametrize("timeout", [0, -1, 1e308, float("inf"), float("nan")])
 def test_a_time_out_that_is_none_is_refused(timeout):
     with pytest.raises(InvalidInputError, match=r"time-out of a camera: .*; expected seconds above 0"):
         FrameSource("camera", 0, timeout)
