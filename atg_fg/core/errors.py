@@ -50,7 +50,8 @@ class WorkerLostError(AtgError, RuntimeError):
 
 def unknown_name(kind: str, name: object, known: Iterable[object]) -> UnknownNameError:
     """Return the error for ``name`` missing from a registry, listing the names ``known`` there."""
-    from atg_fg.core.checks import brief  # which has errors of this module
-
+    # No other name is long: a number may have too many digits to be written at all.
+    told = repr(name if isinstance(name, str) else type(name))
+    told = told if len(told) <= 200 else f"{told[:197]}..."
     names = ", ".join(sorted(map(str, known)))
-    return UnknownNameError(f"{kind}: unknown name {brief(name)}; expected one of: {names}")
+    return UnknownNameError(f"{kind}: unknown name {told}; expected one of: {names}")
