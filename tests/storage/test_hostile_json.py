@@ -1,5 +1,6 @@
 """What JSON can say that no reader expects, at each place of a file of each kind: one short error, in little time."""
 
+import gc
 import json
 import time
 from collections.abc import Iterator
@@ -80,6 +81,14 @@ def files(kind: str, what: str, depth: int) -> Iterator[bytes]:
             line = json.dumps(changed, ensure_ascii=False).replace(f'"{MARK}"', what).encode()
             lines = [*whole[:number], line, *whole[number + 1 :]]
             yield packed(lines) if kind in PACKED else b"\n".join(lines) + b"\n"
+
+
+@pytest.fixture(autouse=True)
+def nothing_of_other_tests_to_collect():
+    """Leave what other tests made out of the collections that a million new lists set off: they would be timed, too."""
+    gc.freeze()
+    yield
+    gc.unfreeze()
 
 
 def check(kind, content, folder):
