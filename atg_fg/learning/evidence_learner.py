@@ -24,8 +24,8 @@ MOST_WRONG: Final = 0.3
 NOVEL: Final = 0.5
 #: Classes of structure that are rivals where there is one slot.
 MOST_RIVALS: Final = 3
-#: ln of the prior weight of the other classes beside an automaton that all objects share, where there is one slot.
-EXCEPTION: Final = -4.0
+#: ln of the prior weight of each other class beside an automaton that all objects share, where there is one slot.
+LOG_PRIOR_OF_OTHERS: Final = -4.0
 #: Chains of less weight are not followed through a trial.
 LEAST_WEIGHT: Final = 1e-3
 
@@ -286,8 +286,8 @@ class EvidenceLearner:
             sizes = (self.assumptions.n_aspects, n_slots, n_actions, alphabet.n_symbols)
             return RivalPopulations(
                 (AutomatonPopulation(*sizes), 0.0),
-                (AutomatonPopulation(*sizes, may_own=True), EXCEPTION),
-                (RegisterPopulation(n_slots, n_actions, alphabet.n_symbols), EXCEPTION),
+                (AutomatonPopulation(*sizes, may_own=True), LOG_PRIOR_OF_OTHERS),
+                (RegisterPopulation(n_slots, n_actions, alphabet.n_symbols), LOG_PRIOR_OF_OTHERS),
             )
         return RegisterPopulation(n_slots, n_actions, alphabet.n_symbols)
 
