@@ -13,7 +13,7 @@ unexport PYTHONDONTWRITEBYTECODE
 
 .DEFAULT_GOAL := help
 .PHONY: help setup peers demo test test-all test-peers torture package lint format notebooks docs bench results results-pictures results-engines results-robot results-goal results-evidence \
-	results-structure example-memory tour clean
+	results-structure example-memory feature-spaces tour clean
 
 help:  ## Say what there is to make
 	@grep -hE '^[a-z-]+:.*##' $(MAKEFILE_LIST) | sed -E 's/:.*## /\t/' | expand -t 12
@@ -235,6 +235,9 @@ example-memory: $(READY)  ## Learn the memory that comes with the package (half 
 			--seed $$seed || exit; \
 	done
 	cp $(EXAMPLE) atg_fg/storage/data/cubes.json
+
+feature-spaces: $(READY)  ## Calibrate the features that worlds without tags come with (a quarter of a minute)
+	$(BIN)/python -m sim.kept_features
 
 tour: $(READY)  ## Run the commands of docs/tour.md and write down what they print (some ten minutes)
 	$(BIN)/python docs/tour.py

@@ -82,7 +82,7 @@ class AppearanceWorld(FiniteStateWorld):
 
     @cached_property
     def sense(self) -> AppearanceSense:
-        """One that reads these observations and knows no class yet; it takes seconds to calibrate the first one."""
+        """One that reads these observations and knows no class yet."""
         return AppearanceSense(self.feature_space(), self.alphabet, within=self.within)
 
     @property

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Any, Final
 
 import cv2
@@ -11,20 +10,20 @@ from numpy.typing import NDArray
 
 from atg_fg.core.object_sense import ObjectSense
 from atg_fg.core.patterns import FloatArray, PatternAlphabet
-from atg_fg.senses.face_features import VIEW, VIEW_FEATURES, face_features
+from atg_fg.senses.face_features import VIEW, VIEW_FEATURES, FaceFeatures
 from atg_fg.senses.feature_space import FeatureSpace
 from atg_fg.worlds.arcube import ACTION_SOURCES, ORIENTATIONS, rotation_of
 from sim.bodies.meshes import DENSITY_SPREAD, TYPICAL_WEIGHT, calibration_meshes, make_meshes
 from sim.vision.camera import Camera
 from sim.vision.mesh_camera import MeshCamera
+from sim.worlds.feature_spaces import CALIBRATION_SEED, feature_space
 from sim.worlds.kinematic_world import KinematicWorld
 from sim.worlds.rendered_world import checked_size
 
 #: Numbers that classes of appearance can have: each way in which a thing can lie looks otherwise.
 MOST_CLASSES: Final = 1000
-#: Things that calibrate the features, looks at each of their orientations, and directions that are kept.
-_CALIBRATION_SEED: Final = 987_654_321
-_CALIBRATION_THINGS, _LOOKS, _DIMENSIONS = 20, 3, 24
+#: Things that calibrate the features, and looks at each of their orientations.
+_CALIBRATION_THINGS, _LOOKS = 20, 3
 #: Standard deviation of the logarithm of weights: of densities, and of the volumes of bounding boxes.
 _WEIGHT_SPREAD: Final = float(np.hypot(DENSITY_SPREAD, 0.75))
 _SIZE: Final = (160, 120)
@@ -90,7 +89,7 @@ class MeshesWorld(KinematicWorld):
 
     def feature_space(self) -> FeatureSpace:
         """Return the space of features, calibrated on things that are in no world."""
-        return calibrated_space(self.features_name)
+        return feature_space("meshes", self.features_name, calibration_looks)
 
     def camera_picture(self) -> NDArray[np.uint8]:
         """Return the last camera frame with what was cut out of it to its right, whatever the mode."""
@@ -110,19 +109,13 @@ class MeshesWorld(KinematicWorld):
         return super()._look()
 
 
-@lru_cache(maxsize=4)
-def calibrated_space(features: str) -> FeatureSpace:
-    """Return the space of features, calibrated on things that are in no world.
-
-    Args:
-        features: ``"grid-and-gradients"``, or ``module:function`` of a user's own.
-    """
-    make, camera = face_features(features), MeshCamera(Camera(image_size=_SIZE))
-    rng = np.random.default_rng(_CALIBRATION_SEED)
+def calibration_looks(make: FaceFeatures) -> list[list[FloatArray]]:
+    """Return features of looks at things that are in no world: three at each of 480 ways in which one lies."""
+    camera, rng = MeshCamera(Camera(image_size=_SIZE)), np.random.default_rng(CALIBRATION_SEED)
     looks: list[list[FloatArray]] = []
     for mesh in calibration_meshes(_CALIBRATION_THINGS, rng):
         for orientation in range(len(ORIENTATIONS)):
             frames = [camera.frame(mesh, rotation_of(orientation), rng) for _ in range(_LOOKS)]
             looks.append([make(camera.view(frame)) for frame in frames])
     camera.close()
-    return FeatureSpace.calibrated(features, looks, _DIMENSIONS)
+    return looks

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import lru_cache
 from typing import Any, Final
 
 import cv2
@@ -11,7 +10,7 @@ from numpy.typing import NDArray
 
 from atg_fg.core.object_sense import ObjectSense
 from atg_fg.core.patterns import FloatArray, PatternAlphabet
-from atg_fg.senses.face_features import CROP, DEFAULT_FEATURES, face_features
+from atg_fg.senses.face_features import CROP, DEFAULT_FEATURES, FaceFeatures
 from atg_fg.senses.feature_space import FeatureSpace
 from atg_fg.worlds.arcube import (
     ACTION_SOURCES,
@@ -26,15 +25,15 @@ from sim.bodies.pictures import TYPICAL_WEIGHT, WEIGHT_SPREAD, Difference, draw_
 from sim.vision.camera import Camera
 from sim.vision.picture_box_camera import PictureBoxCamera
 from sim.worlds.appearance_world import AppearanceWorld
+from sim.worlds.feature_spaces import CALIBRATION_SEED, feature_space
 from sim.worlds.kinematic_world import KinematicWorld
 from sim.worlds.rendered_world import checked_size
 
 #: Numbers that classes of appearance can have.
 MOST_CLASSES: Final = 48
 _SLOTS: Final = ("front", "top")
-#: Boxes whose pictures calibrate the features, each seen in all its orientations, and directions that are kept.
-_CALIBRATION_SEED: Final = 987_654_321
-_CALIBRATION_BOXES, _DIMENSIONS = 24, 24
+#: Boxes whose pictures calibrate the features, each seen in all its orientations.
+_CALIBRATION_BOXES: Final = 24
 #: How much more looks at one picture scatter than on average over pictures, and than those that were calibrated on.
 _WITHIN: Final = 3.0
 
@@ -72,7 +71,7 @@ class BoxesWithPictures(AppearanceWorld):
 
     def feature_space(self) -> FeatureSpace:
         """Return the space of features, calibrated on pictures that are on no box of any world."""
-        return calibrated_space(self.features_name)
+        return feature_space("picture-box", self.features_name, calibration_looks)
 
     def _pattern(self) -> tuple[int, ...]:
         return shown_pattern(self.boxes.faces[self.object], self.state)
@@ -162,15 +161,9 @@ def beside(picture: NDArray[np.uint8], crops: NDArray[np.uint8]) -> NDArray[np.u
     return np.hstack([picture, np.asarray(column, dtype=np.uint8)])
 
 
-@lru_cache(maxsize=4)
-def calibrated_space(features: str) -> FeatureSpace:
-    """Return the space of features, calibrated on pictures that are on no box of any world.
-
-    Args:
-        features: ``"colours-and-gradients"``, or ``module:function`` of a user's own.
-    """
-    make, camera = face_features(features), PictureBoxCamera(Camera())
-    rng = np.random.default_rng(_CALIBRATION_SEED)
+def calibration_looks(make: FaceFeatures) -> list[list[FloatArray]]:
+    """Return features of looks at pictures that are on no box of any world: eight at each of 144 pictures."""
+    camera, rng = PictureBoxCamera(Camera()), np.random.default_rng(CALIBRATION_SEED)
     looks: list[list[FloatArray]] = []
     for _ in range(_CALIBRATION_BOXES):
         pictures = [draw_picture(rng) for _ in FACES]
@@ -180,4 +173,4 @@ def calibrated_space(features: str) -> FeatureSpace:
             for place, crop in zip((FRONT, TOP), crops, strict=True):
                 of_face[faces[place]].append(make(crop))
         looks += of_face
-    return FeatureSpace.calibrated(features, looks, _DIMENSIONS)
+    return looks

@@ -70,16 +70,6 @@ def test_what_is_no_function_is_refused_with_all_that_there_is(name):
         face_features(name)
 
 
-def test_features_that_change_their_length_calibrate_nothing(monkeypatch):
-    pytest.importorskip("pybullet")
-    from sim.worlds import picture_box_world
-
-    lengths = iter(range(1, 10_000))
-    monkeypatch.setattr(picture_box_world, "face_features", lambda _: lambda crop: np.ones(next(lengths)))
-    with pytest.raises(InvalidInputError, match=r"calibration of 'mine:f': .*; expected as many features of each look"):
-        picture_box_world.calibrated_space("mine:f")
-
-
 SQUARE = np.array([[0, 0], [9, 0], [9, 9], [0, 9]], dtype=np.float64)
 
 
