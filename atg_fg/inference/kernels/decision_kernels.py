@@ -11,7 +11,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from atg_fg.core.patterns import FloatArray
+from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.inference.kernels.compilation import compiled, reordered
 
 #: Smallest normal number, in place of zero under a logarithm: x ln x of what is below it is zero up to rounding.
@@ -25,6 +25,10 @@ _ROOT_OF_HALF: Final = int(np.array(np.sqrt(0.5)).view(np.int64))
 _MANTISSA: Final = 52
 
 _LN_2: Final = float(np.log(2.0))
+
+#: What an index is made of that is never negative: Numba asks of any other whether it counts from the end, and a
+#: decision takes a third longer.
+_place: Final = np.uint64
 
 
 @reordered
@@ -53,23 +57,45 @@ def logarithm(number: float) -> float:
 
 
 @reordered
-def _sum_x_log_x(values: FloatArray, n_values: int) -> float:
-    """Return Σ x ln x of the first values."""
+def _sum_x_log_x(values: FloatArray) -> float:
+    """Return Σ x ln x."""
     total = 0.0
-    for number in range(n_values):
+    for number in range(len(values)):
         value = max(values[number], _LEAST)
         total += value * logarithm(value)
     return total
 
 
 @reordered
-def _weighted_sum_x_log_x(values: FloatArray, weights: FloatArray, n_values: int) -> float:
-    """Return Σ weight · x ln x of the first values."""
+def _weighted_sum_x_log_x(values: FloatArray, weights: FloatArray) -> float:
+    """Return Σ weight · x ln x."""
     total = 0.0
-    for number in range(n_values):
+    for number in range(len(values)):
         value = max(values[number], _LEAST)
         total += weights[number] * value * logarithm(value)
     return total
+
+
+@compiled
+def _add_others(terms: FloatArray, others: FloatArray, factors: FloatArray, n_others: int) -> None:
+    """Add Σ factor · x ln x of the first values in the block of each action to its term."""
+    for action in range(len(terms)):
+        begin, end = action * _BLOCK, action * _BLOCK + n_others
+        terms[action] += _weighted_sum_x_log_x(others[begin:end], factors[begin:end])
+
+
+@compiled
+def _add_reached(terms: FloatArray, reached: FloatArray, n_reached: IntArray, n_next: int) -> tuple[FloatArray, int]:
+    """Add Σ x ln x of the values of each action to its term; return empty blocks with room for more, and their size."""
+    block = len(reached) // len(terms)
+    for action in range(len(terms)):
+        begin = action * block
+        terms[action] += _sum_x_log_x(reached[begin : begin + n_reached[action]])
+    n_reached[:] = 0
+    if n_next > block:
+        block = 2 * n_next
+        reached = np.empty(len(terms) * block)
+    return reached, block
 
 
 @compiled
@@ -91,15 +117,16 @@ def next_looks(
         predictive: Filled; rounding may leave some of it below zero.
         terms: Filled.
     """
-    n_known, pattern, begins, edges, _, edge_probability = tables
+    n_known, own_patterns, own_begins, pairs, _, edge_probability = tables
     n_aspects, n_patterns, _, delta = constants
-    n_actions, observed = len(terms), 1.0 - delta
+    n_actions, observed, width = len(terms), 1.0 - delta, aspects.shape[1]
+    # In one dimension, since the loops below have no registers left for strides.
+    belief, pattern, begins, edges = aspects.ravel(), own_patterns.ravel(), own_begins.ravel(), pairs.ravel()
     # Four at a time are added in one operation.
     padded = (n_actions + 3) // 4 * 4
-    more, everywhere = np.zeros(padded), np.zeros(n_actions)
-    added = np.zeros((n_patterns, padded))
-    reached, n_reached = np.empty((n_actions, _BLOCK)), np.zeros(n_actions, np.int64)
-    others, factors, n_others = np.empty((n_actions, _BLOCK)), np.empty((n_actions, _BLOCK)), 0
+    more, everywhere, added = np.zeros(padded), np.zeros(n_actions), np.zeros(n_patterns * padded)
+    reached, n_reached, block = np.empty(n_actions * _BLOCK), np.zeros(n_actions, np.int64), _BLOCK
+    others, factors, n_others = np.empty(n_actions * _BLOCK), np.empty(n_actions * _BLOCK), 0
     terms[:] = 0.0
     for hypothesis in range(len(weights)):
         weight, n_own = weights[hypothesis], n_known[hypothesis]
@@ -108,53 +135,52 @@ def next_looks(
         if n_own < n_aspects:
             rate = (n_aspects - n_own) / n_aspects * (observed / (n_patterns - n_own))
         if n_others + 2 > _BLOCK:
-            for action in range(n_actions):
-                terms[action] += _weighted_sum_x_log_x(others[action], factors[action], n_others)
+            _add_others(terms, others, factors, n_others)
             n_others = 0
+        row, own = hypothesis * width, hypothesis * (n_actions + 1)
         for action in range(n_actions):
-            edge, last = begins[hypothesis, action], begins[hypothesis, action + 1]
-            term = n_reached[action]
-            if term + last - edge > reached.shape[1]:
-                for each in range(n_actions):
-                    terms[each] += _sum_x_log_x(reached[each], n_reached[each])
-                n_reached[:] = 0
-                term = 0
-                if last - edge > reached.shape[1]:
-                    reached = np.empty((n_actions, 2 * (last - edge)))
-            first, left = term, 1.0
+            edge, last = begins[_place(own + action)], begins[_place(own + action + 1)]
+            if n_reached[action] + last - edge > block:
+                reached, block = _add_reached(terms, reached, n_reached, last - edge)
+            first = action * block + n_reached[action]
+            term, left = first, 1.0
             while edge < last:
-                target = edges[edge, 0]
-                arrived = aspects[hypothesis, edges[edge, 1]] * edge_probability[edge]
+                target = edges[_place(2 * edge)]
+                arrived = belief[_place(row + edges[_place(2 * edge + 1)])] * edge_probability[_place(edge)]
                 edge += 1
-                while edge < last and edges[edge, 0] == target:
-                    arrived += aspects[hypothesis, edges[edge, 1]] * edge_probability[edge]
+                while edge < last and edges[_place(2 * edge)] == target:
+                    arrived += belief[_place(row + edges[_place(2 * edge + 1)])] * edge_probability[_place(edge)]
                     edge += 1
                 left -= arrived
                 arrived *= observed * weight
-                added[pattern[hypothesis, target], action] += arrived
-                reached[action, term] = arrived
+                added[_place(pattern[_place(row + target)] * padded + action)] += arrived
+                reached[_place(term)] = arrived
                 term += 1
             kept = max(left, 0.0) * weight
             unknown = kept * rate + noise
             unreached = kept * (observed / n_aspects) + noise
             for number in range(first, term):
-                reached[action, number] += unreached
-            n_reached[action] = term
+                reached[_place(number)] += unreached
+            n_reached[action] += term - first
             more[action] = unreached - unknown
             everywhere[action] += unknown
-            others[action, n_others], factors[action, n_others] = unknown, n_patterns - n_own
-            others[action, n_others + 1], factors[action, n_others + 1] = unreached, n_own - (term - first)
+            other = action * _BLOCK + n_others
+            others[_place(other)], factors[_place(other)] = unknown, n_patterns - n_own
+            others[_place(other + 1)], factors[_place(other + 1)] = unreached, n_own - (term - first)
         n_others += 2
-        for state in range(1, n_own + 1):
-            known = pattern[hypothesis, state]
-            for four in range(0, padded, 4):
-                for action in range(four, four + 4):
-                    added[known, action] += more[action]
+        for four in range(0, padded, 4):
+            one, two, three, last_one = more[four], more[four + 1], more[four + 2], more[four + 3]
+            for state in range(1, n_own + 1):
+                known = pattern[_place(row + state)] * padded + four
+                added[_place(known)] += one
+                added[_place(known + 1)] += two
+                added[_place(known + 2)] += three
+                added[_place(known + 3)] += last_one
+    _add_others(terms, others, factors, n_others)
+    _add_reached(terms, reached, n_reached, 0)
     for action in range(n_actions):
         for each in range(n_patterns):
-            predictive[action, each] = added[each, action] + everywhere[action]
-        terms[action] += _sum_x_log_x(reached[action], n_reached[action])
-        terms[action] += _weighted_sum_x_log_x(others[action], factors[action], n_others)
+            predictive[action, each] = added[each * padded + action] + everywhere[action]
 
 
 @compiled
@@ -180,5 +206,5 @@ def expected_entropies(
     predictive = np.empty((n_actions, n_patterns))
     next_looks(tables, constants, aspects, identity, predictive, expected)
     for action in range(n_actions):
-        entropy = _sum_x_log_x(predictive[action], n_patterns) - expected[action]
+        entropy = _sum_x_log_x(predictive[action]) - expected[action]
         expected[action] = max(entropy + identity[len(identity) - 1] * log_n_unseen, 0.0)
