@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
-from atg_fg.learning.raw_trials import RawTrial
+from atg_fg.learning.kernels import TrialArrays
+from atg_fg.learning.map_kernels import anneal_maps, map_log_evidence
+from atg_fg.learning.raw_trials import RawTrial, Recording
 from atg_fg.learning.shared_structure import is_permutation
 from atg_fg.learning.state_merging import merge_states as merge_into
 from atg_fg.learning.state_merging import mode_automata
@@ -58,6 +60,24 @@ def test_a_trial_with_a_fault_is_left_out():
     trials[6] = RawTrial(tuple(looks), trials[6].actions)
     merged = merge_states(trials, ONE_MODE)
     assert (merged.structure, merged.n_trials) == (CUBE, 11)
+
+
+@pytest.mark.parametrize("n_trials", [4, 8])
+@pytest.mark.parametrize("seed", range(2))
+def test_exact_evidence_of_all_trials_has_nothing_to_mend(n_trials, seed):
+    """Those with errors too, which merging leaves out: annealing that begins with what merged stays there."""
+    rng = np.random.default_rng(seed)
+    trials = [trial_of(each, 10, rng, slip=0.02, wrong=0.005) for each in cubes(n_trials, seed)]
+    merged = merge_states(trials, ONE_MODE)
+    assert merged.n_trials < n_trials
+    recording, sources, prior = Recording.of(trials, 12), np.array(merged.structure.sources), np.full(12, 1 / 12)
+    looks = np.where(recording.labels[..., None] == np.arange(12), 0.99, 0.01 / 11)
+    arrays = TrialArrays(looks, recording.actions, recording.lengths)
+    rest = np.full(n_trials, -60.0), sources, 2, prior
+    before = map_log_evidence(arrays, *rest)
+    after = anneal_maps(arrays, *rest, np.array([1.0, 20.0]), False, 0.0, np.random.default_rng(0))
+    assert after == before
+    assert sources.tolist() == list(map(list, CUBE.sources))
 
 
 def test_actions_that_were_exchanged_are_found_out():
