@@ -6,19 +6,19 @@ import pytest
 from tests import dask_cluster
 
 #: Files that take longest, in the order in which workers begin them, before all others: so none is left with a long one
-#: at the end. Where nothing is compiled yet, the first one compiles most loops of learning. Those that use them, too,
-#: come later, so that two workers do not compile the same.
+#: at the end. Where nothing is compiled yet, the first one compiles most loops of learning; those that use them, too,
+#: come after others that do not, so that two workers never compile the same.
 LONGEST = (
     "engines/test_learned_structure.py",
-    "sim/worlds/test_picture_box_world.py",
     "sim/worlds/test_robonaut_world.py",
+    "learning/test_learner.py",
     "sim/worlds/test_stations_world.py",
     "cli/test_endings.py",
-    "core/test_object_sense.py",
     "report/test_browser.py",
     "sim/worlds/test_rendered_world.py",
     "sim/manipulation/test_waypoints.py",
-    "learning/test_learner.py",
+    "sim/worlds/test_picture_box_world.py",
+    "core/test_object_sense.py",
     "cli/test_live.py",
     "cli/test_recordings.py",
     "report/test_every_record.py",
@@ -54,9 +54,9 @@ def pytest_collection_modifyitems(items):
     items.sort(key=lambda item: places.get(item.path, len(places)))
 
 
-@pytest.fixture(scope="session")
+@pytest.fixture(scope="module")
 def dask_address(tmp_path_factory):
-    """A scheduler with two workers."""
+    """A scheduler with two workers, which end with the file."""
     pytest.importorskip("distributed")
     folder = tmp_path_factory.mktemp("dask")
     with dask_cluster.scheduler(folder) as (_, address), dask_cluster.workers(address, folder):

@@ -7,22 +7,16 @@ look shows the contents of the registers in view. So the tables are those of any
 
 from __future__ import annotations
 
-import itertools
-from typing import Final
-
 import numpy as np
 
 from atg_fg.core.actions import mixed
-from atg_fg.core.errors import InvalidInputError, TooLargeError
-from atg_fg.core.patterns import Evidence, FloatArray, PatternAlphabet
-from atg_fg.inference.chain import Chain, forward_pass
+from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.patterns import FloatArray, PatternAlphabet
+from atg_fg.inference.chain import Chain
 from atg_fg.inference.history import History
 from atg_fg.learning import register_contents
 from atg_fg.learning.rates import Rates
-from atg_fg.learning.raw_trials import RawTrial
-from atg_fg.learning.shared_structure import Poses, SharedStructure
-
-MAX_COMPLETIONS: Final = 20_000
+from atg_fg.learning.shared_structure import Poses
 
 
 def pose_patterns(poses: Poses, contents: FloatArray, rates: Rates, alphabet: PatternAlphabet) -> FloatArray:
@@ -83,32 +77,3 @@ def _transition(poses: Poses, action: int, slip: float) -> FloatArray:
     table = slip * np.eye(len(poses.successors))
     table[np.arange(len(table)), poses.successors[:, action]] += 1.0 - slip
     return table
-
-
-def completions(structure: SharedStructure, alphabet: PatternAlphabet) -> FloatArray:
-    """Return all contents with a different symbol in each register, each of the same probability, shape [H, P, S].
-
-    Raises:
-        TooLargeError: There are more than ``MAX_COMPLETIONS``.
-    """
-    number = 1
-    for register in range(structure.n_registers):
-        number *= alphabet.n_symbols - register
-        if number > MAX_COMPLETIONS:
-            raise TooLargeError(f"contents: more than {MAX_COMPLETIONS} possible; expected fewer registers or symbols")
-    symbols = np.array(list(itertools.permutations(range(alphabet.n_symbols), structure.n_registers)), dtype=np.int64)
-    return np.eye(alphabet.n_symbols)[symbols]
-
-
-def exact_log_evidence(structure: SharedStructure, trial: RawTrial, rates: Rates, alphabet: PatternAlphabet) -> float:
-    """Return ln p(trial | structure, a fresh object without repeated symbols), summed over all its contents.
-
-    What ``score_trials`` approximates, for small cases. Raises ``TooLargeError`` for others.
-    """
-    contents = completions(structure, alphabet)
-    history = History(
-        [Evidence.of_detection(alphabet, detection) for detection in trial.detections], list(trial.actions)
-    )
-    prior = np.full(len(contents), 1.0 / max(len(contents), 1))
-    joint = forward_pass(pose_chain(structure.poses(), contents, prior, rates, alphabet, history)).log_joint
-    return float(np.logaddexp.reduce(joint))

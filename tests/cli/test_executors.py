@@ -97,7 +97,8 @@ def where(name, request):
 @pytest.mark.parametrize(
     ("name", "executor"),
     [
-        *(("short table1", executor) for executor in ("process", "thread", "dask")),
+        *(("short table1", executor) for executor in ("process", "thread")),
+        pytest.param("short table1", "dask", marks=slow),
         pytest.param("goal", "process", marks=slow),
         pytest.param("figure3", "dask", marks=slow),
         pytest.param("ablation", "thread", marks=slow),

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 
 from atg_fg.learning.likelihood import score_trials
-from atg_fg.learning.pose_chain import exact_log_evidence
 from atg_fg.learning.rates import Rates
 from atg_fg.learning.shared_structure import SharedStructure
 from tests.learning import oracle
+from tests.learning.completions import exact_log_evidence
 from tests.learning.worlds import ARCUBES, BOX, CUBE, DOUBLE, NEVER, RING, RING_WORLD, cubes, objects_of, trial_of
 
 ALPHABET = RING_WORLD.alphabet

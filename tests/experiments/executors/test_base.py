@@ -17,7 +17,7 @@ def executor(request):
     return request.getfixturevalue("dask_address") if request.param == "dask" else request.param
 
 
-@pytest.fixture(params=["process", "dask"])
+@pytest.fixture(params=["process", pytest.param("dask", marks=pytest.mark.slow)])
 def mortal(request):
     """An executor whose workers are processes that can be killed."""
     return request.getfixturevalue("dask_address") if request.param == "dask" else request.param
