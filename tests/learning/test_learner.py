@@ -1,18 +1,22 @@
 import json
 from dataclasses import astuple
+from fractions import Fraction
 
 import numpy as np
 import pytest
 
+from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.learning.kinds import choose_kinds
 from atg_fg.learning.learner import N_CHAINS, N_DRAWS, StructureLearner
 from atg_fg.learning.milestones import is_milestone
-from atg_fg.learning.plain_evidence import USUAL
+from atg_fg.learning.plain_evidence import SURE, USUAL
 from atg_fg.learning.rates import Rates
+from atg_fg.learning.raw_trials import RawTrial
 from atg_fg.learning.register_search import n_scored
 from atg_fg.storage.structure_json import read_learner, write_learner
 from atg_fg.worlds.families import hexagonal_prisms
+from tests.learning.oracle import Structure
 from tests.learning.worlds import (
     ARCUBES,
     CUBE,
@@ -28,6 +32,7 @@ from tests.learning.worlds import (
     uncertain_object,
     uncertain_trial,
 )
+from tests.oracle import Atg, Oracle
 
 
 def learned(objects, order, seed=0, n_actions=10, assumptions=ARCUBES, **noise):
@@ -231,6 +236,64 @@ def test_objects_whose_actions_are_uncertain_are_a_kind_of_their_own(unsure):
     assert (uncertain.members[3:] > 0.5).mean() > 0.8
     assert uncertain.share > 0.3
     assert uncertain.noise.concentration >= 0.3
+
+
+def plain_atg(before, trial, noise):
+    """p(trial | the plain ATG that the trials before it made), by every path in exact fractions."""
+    alphabet = RING_WORLD.alphabet
+    graph = AspectTransitionGraph("it", RING_WORLD)
+    for earlier in before:
+        graph.learn([alphabet.index(look) for look in earlier.detections], earlier.actions)
+    known = [alphabet.patterns[pattern] for pattern in graph.pattern_indices]
+    counts = {(known[x], action, known[y]): n for (x, action, y), n in graph.counts.items()}
+    alpha, delta = (Fraction(str(each)) for each in noise)
+    sum_over_paths = Oracle(
+        n_objects=2,
+        n_aspects=RING_WORLD.n_aspects,
+        n_actions=2,
+        patterns=alphabet.patterns,
+        graphs=[Atg(known, counts)] if before else [],
+        alpha=alpha,
+        delta=delta,
+        learn_in_trial=True,
+    )
+    for time, look in enumerate(trial.detections):
+        if time:
+            sum_over_paths.act(trial.actions[time - 1])
+        sum_over_paths.observe({z: Fraction(z == look) for z in sum_over_paths.Z}, look)
+    weights = [weight for (hypothesis, _), weight in sum_over_paths.weights.items() if hypothesis == 0]
+    return sum(weights) * (2 if before else 1)  # without an ATG hypothesis 0 is of all objects
+
+
+#: Looks of the ring that slips once, or of a plain object that stays as it is once.
+DOUBTFUL = [((4, 2), (4, 2), (3, 4)), ((0, 2), (3, 0), (3, 0)), ((0, 2), (0, 2))]
+
+
+def test_of_which_kind_a_remembered_object_is_sums_over_contents_poses_and_aspects():
+    rng, rates = np.random.default_rng(3), Rates(slip=0.05, wrong=0.02, repeat=1e-9)
+    sure = objects_of(RING, [(0, 1, 2), (0, 3, 1)])
+    owners = ["sure 0", "sure 1"] * 3 + ["once", "twice", "twice"]
+    trials = [trial_of(sure[number % 2], 14, rng) for number in range(6)]
+    trials += [RawTrial(looks, (0, 0)[: len(looks) - 1]) for looks in DOUBTFUL]
+    learner = StructureLearner(RING_WORLD)
+    learner.restore(owners, trials, [RING], rates)
+    (followed,) = [each for each in learner.believed(["once", "twice"]) if each.weight > 1 - 1e-6]
+    uncertain = learner.uncertain(["once", "twice"])
+    exact = Structure(2, RING.sources, 5, Fraction(1, 20), Fraction(1, 50))
+    shares = [1.0 - followed.share - uncertain.share, uncertain.share, followed.share]
+    for number, of in enumerate((trials[6:7], trials[7:])):
+        each_kind = np.array(shares)
+        for later, trial in enumerate(of):
+            fresh, own = (
+                np.array([float(plain_atg(before, trial, noise)) for noise in (SURE, uncertain.noise)])
+                for before in ([], of[:later])
+            )
+            plain = own * fresh.sum() / own.sum()
+            each_kind *= [*plain, float(exact.fresh(trial.detections, trial.actions))]
+        each_kind /= each_kind.sum()
+        assert 0.01 < each_kind[2] < 0.99
+        assert followed.followers[number] == pytest.approx(each_kind[2], abs=0.01)
+        assert uncertain.members[number] == pytest.approx(each_kind[1], abs=0.01)
 
 
 def test_of_an_object_without_a_trial_its_kind_is_as_of_any_plain_one(unsure):
