@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
+
+import pytest
 
 from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.assumptions import Assumptions
@@ -15,6 +17,20 @@ from atg_fg.inference.interface import Inference
 
 EXACT_ENGINES = [name for name, engine in ENGINES.items() if engine.exact]
 APPROXIMATE_ENGINES = [name for name, engine in ENGINES.items() if not engine.exact]
+#: Engines that make the whole graph anew at each question, and differ in how GTSAM eliminates it.
+ROUTES = [name for name in EXACT_ENGINES if name.startswith("gtsam-")]
+
+
+def each_of(engines: Iterable[str]) -> pytest.MarkDecorator:
+    """Run a test with each of these engines; but for the first route, routes are left to the slow tests.
+
+    ``engines/test_agreement.py`` holds all of them to the truth in any case.
+    """
+    marks = dict.fromkeys(ROUTES[1:], pytest.mark.slow)
+    return pytest.mark.parametrize("engine", [pytest.param(each, marks=marks.get(each, ())) for each in engines])
+
+
+every_exact_engine = each_of(EXACT_ENGINES)
 
 
 def one_slot(n_objects: int, n_aspects: int, n_symbols: int, actions: tuple[str, ...] = ("push",)) -> Assumptions:

@@ -32,6 +32,7 @@ def repository(tmp_path, monkeypatch):
     return tmp_path
 
 
+@pytest.mark.slow
 def test_the_turns_of_a_revision_run_its_own_code(repository):
     for revision, seconds in (("HEAD~1", 6.0), ("HEAD", 2.0)):
         with against.built(commit_of(revision)) as earlier, Side(*earlier) as side:

@@ -87,7 +87,9 @@ class TestOutput:
         assert (error, process.returncode) == ("atg-fg: standard output: No space left on device\n", 2)
 
 
-@pytest.mark.parametrize("encoding", ["ascii", pytest.param("latin-1", marks=pytest.mark.slow), "utf-8"])
+@pytest.mark.parametrize(
+    "encoding", ["ascii", *(pytest.param(each, marks=pytest.mark.slow) for each in ("latin-1", "utf-8"))]
+)
 def test_what_an_encoding_does_not_know_is_written_out(encoding, folder):
     name = os.fsdecode(b"caf\xc3\xa9-\xff.json")
     (folder / name).write_bytes((folder / "memory.json").read_bytes())
@@ -101,7 +103,10 @@ def test_what_an_encoding_does_not_know_is_written_out(encoding, folder):
 
 
 @linux
-@pytest.mark.parametrize("loaded", ["_datetime", "_multiarray_umath", "_sqlite3", "gtsam"])
+@pytest.mark.parametrize(
+    "loaded",
+    ["_datetime", "gtsam", *(pytest.param(each, marks=pytest.mark.slow) for each in ("_multiarray_umath", "_sqlite3"))],
+)
 def test_ctrl_c_ends_a_command_while_it_loads_libraries(loaded, folder):
     process = begin("table1", "--tests", "1", "--jobs", "1", cwd=folder, stdout=subprocess.DEVNULL)
     wait_for(lambda: loaded in Path(f"/proc/{process.pid}/maps").read_text())

@@ -149,6 +149,7 @@ def test_tests_in_a_log_outlive_ctrl_c(serial, tmp_path):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="finds processes in /proc")
 class TestKilled:
+    @slow
     def test_a_worker_that_is_killed_changes_nothing(self, serial, tmp_path):
         records = tmp_path / "records"
         process = begin(*TABLE1, "--jobs", 2, "--records", records, "--json", tmp_path / "json")

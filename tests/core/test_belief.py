@@ -11,11 +11,10 @@ from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.engines import begin_trial
 from tests.core.test_table import Reader
-from tests.small import EXACT_ENGINES, graph, one_slot, seen, trial
+from tests.small import every_exact_engine, graph, one_slot, seen, trial
 
 EXACT = ModelParameters(0.0, 0.0, learn_in_trial=False)
 EXACT_LEARNING = ModelParameters(0.0, 0.0, learn_in_trial=True)
-every_exact_engine = pytest.mark.parametrize("engine", EXACT_ENGINES)
 
 
 def one_known_aspect() -> RobotMemory:

@@ -11,11 +11,10 @@ from atg_fg.core.parameters import ModelParameters
 from atg_fg.engines import begin_trial, gtsam_routes
 from atg_fg.engines.gtsam_routes import ORDERINGS, GtsamRoute
 from tests.models import random_case
-from tests.small import graph, one_slot, seen, trial
+from tests.small import ROUTES, each_of, graph, one_slot, seen, trial
 
 WORLD = one_slot(3, 2, 4)
-ROUTES = ("gtsam-sequential", "gtsam-multifrontal", "gtsam-marginals")
-every_route = pytest.mark.parametrize("engine", ROUTES)
+every_route = each_of(ROUTES)
 
 
 def two_objects() -> RobotMemory:

@@ -14,12 +14,11 @@ from atg_fg.engines import ENGINES, begin_trial
 from atg_fg.inference.interface import Inference
 from tests.models import Case, random_case
 from tests.oracle import ImpossibleError, Oracle
-from tests.small import EXACT_ENGINES, graph, one_slot, seen
+from tests.small import every_exact_engine, graph, one_slot, seen
 
 WORLD = one_slot(4, 2, 4)
 NOISY = ModelParameters(0.1, 0.1)
 every_engine = pytest.mark.parametrize("engine", ENGINES)
-every_exact_engine = pytest.mark.parametrize("engine", EXACT_ENGINES)
 
 
 def two_objects() -> RobotMemory:

@@ -15,10 +15,9 @@ from atg_fg.core.patterns import Evidence
 from atg_fg.engines import begin_trial
 from atg_fg.inference.interface import Inference
 from tests.models import Case, Look, cases
-from tests.small import EXACT_ENGINES
+from tests.small import EXACT_ENGINES, ROUTES
 
 #: The routes make the whole graph anew at each question: each example plays one of them.
-ROUTES = [engine for engine in EXACT_ENGINES if engine.startswith("gtsam-")]
 A_ROUTE = "a route of gtsam"
 
 every_exact_engine = pytest.mark.parametrize(

@@ -9,11 +9,10 @@ from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence
 from atg_fg.engines import ENGINES, begin_trial
 from atg_fg.inference.interface import Inference
-from tests.small import EXACT_ENGINES, graph, one_slot, seen, trial
+from tests.small import EXACT_ENGINES, each_of, every_exact_engine, graph, one_slot, seen, trial
 
 WORLD = one_slot(3, 2, 4)
 every_engine = pytest.mark.parametrize("engine", ENGINES)
-every_exact_engine = pytest.mark.parametrize("engine", EXACT_ENGINES)
 long_engines = pytest.mark.parametrize("engine", ["bayes-filter", "gtsam"])
 
 
@@ -198,7 +197,7 @@ def test_enumeration_refuses_a_trial_that_is_too_long_for_it(memory: RobotMemory
 
 @pytest.mark.parametrize("learn", [False, True])
 @pytest.mark.parametrize(("alpha", "delta"), [(1e-100, 1e-100), (1e-8, 1e-100), (0.0, 1e-60), (1.0, 1e-100)])
-@pytest.mark.parametrize("engine", [name for name in EXACT_ENGINES if name != "enumeration"])
+@each_of(name for name in EXACT_ENGINES if name != "enumeration")
 def test_noise_next_to_none_is_reckoned_with_in_long_trials(
     engine: str, alpha: float, delta: float, learn: bool
 ) -> None:
@@ -215,7 +214,7 @@ def test_noise_next_to_none_is_reckoned_with_in_long_trials(
 @pytest.mark.parametrize(
     "weights", [(5e-324, 5e-324, 0, 0), (5e-324, 1, 1, 0), (1e308, 5e-324, 0, 0), (0, 1e-310, 0, 1e300), (1e308,) * 4]
 )
-@pytest.mark.parametrize("engine", EXACT_ENGINES)
+@every_exact_engine
 def test_weights_of_any_size_are_judged_alike_by_all_engines(
     engine: str, weights: tuple[float, ...], delta: float
 ) -> None:

@@ -8,7 +8,7 @@ from atg_fg.core.errors import InvalidInputError, UnknownNameError
 from atg_fg.engines import ENGINES
 from atg_fg.experiments.replay import replay
 from atg_fg.storage.scripted_trial import read_script
-from tests.small import EXACT_ENGINES
+from tests.small import EXACT_ENGINES, every_exact_engine
 
 SCRIPT = {
     "format": "atg-fg/scripted-trial",
@@ -55,7 +55,7 @@ def test_the_same_script_gives_the_same_posteriors_in_every_exact_engine(learn):
         assert document["smoothed"]["object"] == documents[0]["smoothed"]["object"]
 
 
-@pytest.mark.parametrize("engine", EXACT_ENGINES)
+@every_exact_engine
 def test_steps_have_the_promised_keys(engine):
     document = json.loads(json.dumps(replay(script(), engine), allow_nan=False))
     assert document["engine"] == engine
@@ -69,7 +69,7 @@ def test_steps_have_the_promised_keys(engine):
     assert act["log_evidence"] == look["log_evidence"]
 
 
-@pytest.mark.parametrize("engine", EXACT_ENGINES)
+@every_exact_engine
 def test_the_first_look_is_right_by_hand(engine):
     # p(z | cube-000) = (1 - d)/24 + d/132 for a known pattern; p(z | unseen) = (1 - d)/132 + d/132 = 1/132.
     delta = 1e-6
@@ -81,7 +81,7 @@ def test_the_first_look_is_right_by_hand(engine):
     assert step["log_evidence"] == pytest.approx(math.log(evidence), abs=1e-12)
 
 
-@pytest.mark.parametrize("engine", EXACT_ENGINES)
+@every_exact_engine
 def test_seeing_nothing_changes_no_belief(engine):
     trial = script(lambda d: d.update(steps=[{"observe": [0, 1]}, {"act": "flip"}, {"observe": [None, None]}]))
     _, act, look = replay(trial, engine)["steps"]

@@ -10,7 +10,7 @@ from atg_fg.engines import begin_trial
 from atg_fg.experiments.exploration import complete_memory, learned_memory
 from atg_fg.policies import RandomPolicy
 from atg_fg.worlds.arcube import make_arcubes, shown_pattern
-from tests.small import EXACT_ENGINES
+from tests.small import EXACT_ENGINES, each_of
 
 ASSUMPTIONS = arcube_assumptions()
 CUBES = make_arcubes(3, seed=0)
@@ -63,7 +63,7 @@ def test_shown_patterns_of_an_unknown_object_by_hand():
     assert shown[ASSUMPTIONS.alphabet.index((4, 3))] == pytest.approx(0.2 / 132, abs=1e-12)
 
 
-@pytest.mark.parametrize("engine", [name for name in EXACT_ENGINES if name != "enumeration"])
+@each_of(name for name in EXACT_ENGINES if name != "enumeration")
 def test_exact_engines_agree(engine):
     parameters = ModelParameters(0.1, 0.2)
     ours, theirs = (looked(PARTIAL, parameters, (3, 4), (4, None), engine=each) for each in (engine, "bayes-filter"))

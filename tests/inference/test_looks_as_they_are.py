@@ -8,7 +8,7 @@ from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence
 from atg_fg.engines import ENGINES, begin_trial
-from tests.small import EXACT_ENGINES, graph, one_slot
+from tests.small import every_exact_engine, graph, one_slot
 
 ASSUMPTIONS = one_slot(3, 3, 4, ("turn", "tip"))
 MEMORY = RobotMemory(
@@ -25,7 +25,7 @@ def soft(*weights):
     return Evidence.of_likelihood(ASSUMPTIONS.alphabet, weights)
 
 
-@pytest.mark.parametrize("engine", EXACT_ENGINES)
+@every_exact_engine
 def test_looks_at_rest_are_independent_evidence_of_one_aspect(engine):
     # Two soft looks at one aspect: p(z, z' | x) = p(z | x) p(z' | x), summed by hand over objects and aspects.
     first, second = np.array([0.7, 0.1, 0.1, 0.1]), np.array([0.2, 0.2, 0.5, 0.1])
@@ -47,7 +47,7 @@ def test_looks_at_rest_are_independent_evidence_of_one_aspect(engine):
     assert trial.log_evidence == pytest.approx(np.log(sum(joint) / 3), abs=1e-12)
 
 
-@pytest.mark.parametrize("engine", EXACT_ENGINES)
+@every_exact_engine
 @pytest.mark.parametrize("learns", [False, True])
 def test_an_uncertain_action_is_the_mixture_of_trials(engine, learns):
     parameters = ModelParameters(0.3, 0.1, learn_in_trial=learns)
@@ -95,7 +95,7 @@ def test_of_dependent_looks_the_strongest_counts_alone(engine):
         assert len(trial.history.evidence) == 1
 
 
-@pytest.mark.parametrize("engine", EXACT_ENGINES)
+@every_exact_engine
 def test_an_impossible_look_at_rest_changes_nothing(engine):
     trial = begin_trial(engine, MEMORY, ModelParameters(0.0, 0.0, learn_in_trial=False))
     trial.observe((0,))
@@ -108,7 +108,7 @@ def test_an_impossible_look_at_rest_changes_nothing(engine):
     trial.observe((1,))
 
 
-@pytest.mark.parametrize("engine", EXACT_ENGINES)
+@every_exact_engine
 def test_a_look_at_rest_finds_the_node_that_the_first_one_made(engine):
     trial = begin_trial(engine, MEMORY, ModelParameters(0.3, 0.1, learn_in_trial=True))
     trial.observe((3,))

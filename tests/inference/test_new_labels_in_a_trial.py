@@ -16,7 +16,7 @@ from atg_fg.core.object_sense import ObjectSense
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, PatternAlphabet
 from atg_fg.engines import begin_trial
-from tests.small import APPROXIMATE_ENGINES, EXACT_ENGINES
+from tests.small import APPROXIMATE_ENGINES, every_exact_engine
 
 LABELS = ("a", "b", "c")
 PARAMETERS = [ModelParameters(0.5, 0.05, learn_in_trial=False), ModelParameters(0.1, 0.1, learn_in_trial=True)]
@@ -55,7 +55,7 @@ def follow(trial, steps=TRIAL):
 
 
 @pytest.mark.parametrize("parameters", PARAMETERS)
-@pytest.mark.parametrize("engine", EXACT_ENGINES)
+@every_exact_engine
 def test_the_posterior_is_that_of_an_alphabet_that_had_the_labels_from_the_start(engine, parameters):
     memory = a_memory(LABELS)
     trial = follow(begin_trial(engine, memory, parameters))
@@ -71,7 +71,7 @@ def test_the_posterior_is_that_of_an_alphabet_that_had_the_labels_from_the_start
     assert trial.memory.assumptions.alphabet.names == (*LABELS, "new", "other")
 
 
-@pytest.mark.parametrize("engine", EXACT_ENGINES)
+@every_exact_engine
 def test_what_was_felt_stays_felt(engine):
     senses = (ObjectSense("weight", 0.5, 0.5, 0.05, "kg"),)
     small, great = a_memory(LABELS, senses=senses), a_memory((*LABELS, "new"), senses=senses)

@@ -21,7 +21,7 @@ from atg_fg.engines import begin_trial
 from atg_fg.inference.explanations import best_explanations, sample_explanations, surprise
 from atg_fg.inference.factor_graph import RecognitionGraph
 from atg_fg.inference.joint_factor_graph import JointRecognitionGraph
-from tests.small import EXACT_ENGINES
+from tests.small import EXACT_ENGINES, each_of
 
 ABLE = [name for name in EXACT_ENGINES if name != "large-memory"]
 WEIGHT = ObjectSense("weight", 0.5, 0.6, 0.08, unit="kg", revealed_by=("flip",))
@@ -59,7 +59,7 @@ def next_density(readings: Sequence[float], reading: float, sense: ObjectSense =
     return joint(values) / joint(values[:-1])
 
 
-@pytest.mark.parametrize("engine", ABLE)
+@each_of(ABLE)
 @pytest.mark.parametrize("parameters", [FIXED, LEARNING])
 def test_readings_multiply_what_looks_say_by_the_density_of_each(engine: str, parameters: ModelParameters) -> None:
     memory = memory_of([0.3, 0.32], [0.6], [])
@@ -82,7 +82,7 @@ def test_readings_multiply_what_looks_say_by_the_density_of_each(engine: str, pa
             np.testing.assert_allclose(ours, theirs, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("engine", ABLE)
+@each_of(ABLE)
 @pytest.mark.parametrize("parameters", [FIXED, LEARNING])
 def test_expected_entropy_counts_on_what_an_action_reveals(engine: str, parameters: ModelParameters) -> None:
     memory = memory_of([0.3, 0.32], [0.6], [0.5, 0.52, 0.51])

@@ -18,7 +18,7 @@ from atg_fg.policies.goal import PLANNERS, GoalPolicy
 from atg_fg.storage.presets import preset
 from atg_fg.worlds.arcube import ORIENTATIONS, SUCCESSORS, make_arcubes, shown_pattern
 from atg_fg.worlds.arcube_world import ARcubeWorld
-from tests.small import EXACT_ENGINES
+from tests.small import EXACT_ENGINES, each_of
 
 ASSUMPTIONS = arcube_assumptions()
 CUBES = make_arcubes(6, seed=0)
@@ -40,7 +40,7 @@ def purposes(record):
     return [step.purpose for step in record.steps]
 
 
-@pytest.mark.parametrize("engine", [name for name in EXACT_ENGINES if name != "enumeration"])
+@each_of(name for name in EXACT_ENGINES if name != "enumeration")
 def test_it_recognises_then_takes_the_shortest_way_and_stops(engine):
     record = served(GoalPolicy(goal_of(2, 9)), engine=engine)
     order = purposes(record)

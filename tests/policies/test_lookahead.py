@@ -9,7 +9,7 @@ from atg_fg.inference.expected_entropy import best_actions
 from atg_fg.policies import EntropyPolicy, LookaheadPolicy, make_policy
 from atg_fg.policies.lookahead import bounds_ahead
 from tests.models import gone_through, random_case
-from tests.small import EXACT_ENGINES, graph, one_slot, trial
+from tests.small import every_exact_engine, graph, one_slot, trial
 
 N_CASES = 40
 
@@ -170,7 +170,7 @@ def detour():
     return RobotMemory(assumptions, [first, second])
 
 
-@pytest.mark.parametrize("engine", EXACT_ENGINES)
+@every_exact_engine
 def test_it_takes_a_detour_that_greed_does_not(engine):
     inference = trial(engine, detour(), ModelParameters(1e-8, 1e-8, learn_in_trial=False), 0)
     greedy = EntropyPolicy().choose(inference, np.random.default_rng(0))
