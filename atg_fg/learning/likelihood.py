@@ -65,9 +65,13 @@ def score_trials(
 
 def follow(own: PoseFilter, trials: TrialArrays, alphabet: PatternAlphabet) -> None:
     """Let a filter go through trials of the same length, one of each owner."""
-    for look, symbols in enumerate(trials.symbols.transpose(1, 0, 2)):
+    looks, actions = np.ascontiguousarray(trials.symbols.transpose(1, 0, 2)), np.ascontiguousarray(trials.actions.T)
+    if (looks != MISSING).all():
+        own.follow(actions, looks)
+        return
+    for look, symbols in enumerate(looks):
         if look:
-            own.act_apart(trials.actions[:, look - 1])
+            own.act_apart(actions[look - 1])
         if (symbols != MISSING).all():
             own.observe_pattern(symbols)
         else:

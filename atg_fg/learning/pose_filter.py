@@ -32,10 +32,6 @@ from atg_fg.learning.register_contents import (
 )
 from atg_fg.learning.shared_structure import Poses
 
-#: Rows less probable than this are dropped.
-NEGLIGIBLE: Final = 1e-9
-
-
 #: Rows less probable than this are left out of what is predicted for planning.
 UNIMPORTANT: Final = 1e-6
 
@@ -46,9 +42,6 @@ EVEN: Final = 1e-3
 
 #: Columns of ``Rows.events``.
 SLIP, WRONG, REPEAT, REVEAL = range(4)
-
-
-_ONE_SLIP: Final = np.eye(4)[SLIP]
 
 
 class Rows(NamedTuple):
@@ -121,7 +114,10 @@ class PoseFilter:
         self.rows = Rows(owner, start, pose, weight, owner, np.zeros((len(owner), 4)))
         self._contents = contents
         self._shown = symbol_probabilities(contents, rates.repeat)
-        self._possible = poses.possible(len(alphabet.slots))
+        n_slots = len(alphabet.slots)
+        # Loops are compiled anew for arrays that are read-only: these are copies.
+        in_view = np.array(poses.registers[:, :n_slots], order="C")
+        self._structure = (np.array(poses.successors), in_view, poses.possible(n_slots), len(poses.first))
         self.log_evidence = np.zeros(n_owners)
 
     def copy(self) -> PoseFilter:
@@ -151,32 +147,28 @@ class PoseFilter:
 
     def act_apart(self, actions: IntArray) -> None:
         """Take in an action of each owner, shape [H]."""
-        rows, slip = self.rows, self._rates.slip
-        moved = rows._replace(
-            pose=self._poses.successors[rows.pose, actions[rows.owner]], weight=rows.weight * (1.0 - slip)
-        )
-        stayed = rows._replace(weight=rows.weight * slip, events=rows.events + _ONE_SLIP)
-        self.rows = Rows(*(np.concatenate(pair) for pair in zip(moved, stayed, strict=True)))
+        self.rows = Rows(*self._kernels.act(tuple(self.rows), self._structure[0], actions, self._rates.slip))
 
     def observe_pattern(self, symbols: IntArray) -> None:
         """Take in looks that showed every slot, shape [J], or [H, J] for a look of each owner."""
-        rows = self.rows
-        seen = np.array(np.broadcast_to(symbols, (len(self.log_evidence), symbols.shape[-1])))
-        in_view = self._in_view(rows)
-        probability = self._kernels.probability_of_look(
-            rows.owner, rows.table, in_view, self._possible[rows.pose], self._shown, seen
+        n_owners = len(self.log_evidence)
+        seen = np.array(np.broadcast_to(symbols, (1, n_owners, symbols.shape[-1])))
+        self.follow(np.zeros((0, n_owners), dtype=np.int64), seen)
+
+    def follow(self, actions: IntArray, symbols: IntArray) -> None:
+        """Take in looks that showed every slot, shape [T, H, J], and the actions between them, shape [T − 1, H]."""
+        rates, log_weights = self._rates, np.zeros(0) if self.log_weights is None else self.log_weights
+        rows, (self._contents, self._shown) = self._kernels.follow(
+            tuple(self.rows),
+            (self._contents, self._shown),
+            self._structure,
+            actions,
+            symbols,
+            (rates.slip, rates.wrong, rates.wrong / len(self._alphabet), rates.repeat),
+            self.log_evidence,
+            log_weights,
         )
-        kept, truth = self._condition(probability, np.ones(1))
-        right = np.flatnonzero(truth > SAME)
-        rows, in_view, truth = self.rows.take(right), in_view[kept[right]], truth[right]
-        tables = self._contents[rows.table]
-        index = np.arange(len(right))
-        # What shows nothing but what is known for certain leaves a table as it is.
-        known = (tables[index[:, None], in_view, seen[rows.owner]] > 1.0 - SAME).all(axis=1)
-        of, repeat = (rows.owner, rows.table), self._rates.repeat
-        self._kernels.reveal(tables, in_view, self._shown, of, seen, truth, rows.events, repeat)
-        self.rows.events[right] = rows.events
-        self._merge(tables[~known], right[~known])
+        self.rows = Rows(*rows)
 
     def observe_likelihood(self, likelihood: FloatArray) -> None:
         """Take in any evidence as a likelihood of each pattern, shape [|𝒵|], or [H, |𝒵|] for a look of each owner."""
@@ -184,7 +176,7 @@ class PoseFilter:
         likelihood = np.broadcast_to(likelihood, (len(self.log_evidence), len(symbols)))
         registers, shown = self._in_view(rows), self._shown_in_view(rows)
         joint = pattern_products(shown, symbols) / distinctness(shown, symbols)[:, None]
-        joint *= self._possible[rows.pose, None] * likelihood[rows.owner]
+        joint *= self._structure[2][rows.pose, None] * likelihood[rows.owner]
         probability = joint.sum(axis=1)
         kept, truth = self._condition(probability, likelihood.sum(axis=1))
         right = np.flatnonzero(truth > SAME)
@@ -257,7 +249,8 @@ class PoseFilter:
 
     def _in_view(self, rows: Rows) -> IntArray:
         """Return the register in each of the J slots, shape [R, J]."""
-        return np.ascontiguousarray(self._poses.registers[rows.pose, : len(self._alphabet.slots)])
+        in_view: IntArray = self._structure[1][rows.pose]
+        return in_view
 
     def _shown_in_view(self, rows: Rows) -> list[FloatArray]:
         """Return the probability of each symbol in each slot, J × [R, S]."""
@@ -277,7 +270,7 @@ class PoseFilter:
         likelihoods = (1.0 - self._rates.wrong) * probability, wrong
         log_weights = np.zeros(0) if self.log_weights is None else self.log_weights
         kept, truth, weight = self._kernels.weigh(
-            self.rows.owner, self.rows.weight, likelihoods, self.log_evidence, log_weights, NEGLIGIBLE
+            self.rows.owner, self.rows.weight, likelihoods, self.log_evidence, log_weights
         )
         self.rows = self.rows.take(kept)._replace(weight=weight)
         self.rows.events[:, WRONG] += 1.0 - truth
@@ -316,25 +309,17 @@ class PoseFilter:
             tables: New ones, shape [I, P, S].
             changed: Index of the row that each belongs to, shape [I].
         """
-        rows, n_old = self.rows, len(self._contents)
-        table = rows.table.copy()
-        table[changed] = n_old + np.arange(len(changed))
-        key = (rows.owner * len(self._poses.first) + rows.start) * len(self._poses.registers) + rows.pose
-        order = np.argsort(key, kind="stable")
-        contents = np.concatenate((self._contents, tables))
-        last, weight, table, events, self._contents, used = self._kernels.merge_rows(
-            order, key, rows.weight, table, rows.events, contents
+        sizes = (len(self._poses.first), len(self._poses.registers))
+        rows, (self._contents, self._shown) = self._kernels.merged(
+            tuple(self.rows), (self._contents, self._shown), tables, changed, sizes, self._rates.repeat
         )
-        old = used[used < n_old]
-        shown = symbol_probabilities(self._contents[len(old) :], self._rates.repeat)
-        self._shown = np.concatenate((self._shown[old], shown))
-        self.rows = Rows(rows.owner[last], rows.start[last], rows.pose[last], weight, table, events)
+        self.rows = Rows(*rows)
 
     def _patterns_of(self, rows: Rows, weights: FloatArray, first: IntArray) -> FloatArray:
         """Return the weighted sum of what rows show, for each owner, shape [I, |𝒵|]."""
         shown = self._shown_in_view(rows)
         symbols = self._alphabet.symbols
-        shown[0] = shown[0] * (weights * self._possible[rows.pose] / distinctness(shown, symbols))[:, None]
+        shown[0] = shown[0] * (weights * self._structure[2][rows.pose] / distinctness(shown, symbols))[:, None]
         combined = shown[0]
         for probabilities in shown[1:]:
             combined = (combined[:, :, None] * probabilities[:, None, :]).reshape(len(combined), -1)

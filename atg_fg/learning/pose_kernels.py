@@ -6,13 +6,19 @@ import numpy as np
 
 from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.inference.kernels.compilation import compiled, compiled_within
+from atg_fg.learning.register_contents import SAME, TINY
 
-#: Keeps divisions by what can be zero in range.
-_TINY = 1e-12
+#: Rows less probable than this are dropped.
+NEGLIGIBLE = 1e-9
 _LEAST = np.finfo(np.float64).tiny
 
+#: Owner, start, pose, weight, table and events of each row, as ``atg_fg.learning.pose_filter`` has them.
+Rows = tuple[IntArray, IntArray, IntArray, FloatArray, IntArray, FloatArray]
+#: What is known of the symbols in the registers of each table, and the probability to be shown, both [K, P, S].
+Known = tuple[FloatArray, FloatArray]
 
-@compiled
+
+@compiled_within
 def probability_of_look(
     owner: IntArray, table: IntArray, in_view: IntArray, possible: FloatArray, shown: FloatArray, seen: IntArray
 ) -> FloatArray:
@@ -30,7 +36,7 @@ def probability_of_look(
     n_slots = seen.shape[1]
     for row in range(len(owner)):
         of = shown[table[row]]
-        probability = possible[row] / max(different(of, in_view[row]), _TINY)
+        probability = possible[row] / max(different(of, in_view[row]), TINY)
         for slot in range(n_slots):
             probability *= of[in_view[row, slot], seen[owner[row], slot]]
         result[row] = probability
@@ -78,7 +84,6 @@ def weigh(
     likelihoods: tuple[FloatArray, FloatArray],
     log_evidence: FloatArray,
     log_weights: FloatArray,
-    negligible: float,
 ) -> tuple[IntArray, FloatArray, FloatArray]:
     """Return which rows are left after a look, how probably it was not wrong under each, and their weights.
 
@@ -88,7 +93,6 @@ def weigh(
         likelihoods: Of the look being right, shape [R], and of its being wrong, shape [H].
         log_evidence: ln p(what was seen | owner), shape [H]; the look's is added.
         log_weights: ln of the weight of each owner, shape [H]; of shape [0] if each is a trial of its own.
-        negligible: Rows less probable than this are dropped.
     """
     right, wrong = likelihoods
     n_rows, n_owners = len(owner), len(log_evidence)
@@ -107,74 +111,90 @@ def weigh(
     for row in range(n_rows):
         both = right[row] + wrong[owner[row]]
         own = weight[row] * both / max(total[owner[row]], _LEAST)
-        if own * importance[owner[row]] > negligible:
+        if own * importance[owner[row]] > NEGLIGIBLE:
             kept[n_kept], truth[n_kept], weights[n_kept] = row, right[row] / both, own
             n_kept += 1
     return kept[:n_kept], truth[:n_kept], weights[:n_kept]
 
 
-@compiled
+@compiled_within
 def reveal(
-    tables: FloatArray,
-    in_view: IntArray,
-    shown: FloatArray,
-    of: tuple[IntArray, IntArray],
-    seen: IntArray,
-    truth: FloatArray,
-    events: FloatArray,
-    repeat: float,
-) -> None:
-    """Let tables learn what a look shows of the registers in view.
+    rows: Rows, known: Known, registers: IntArray, seen: IntArray, truth: FloatArray, repeat: float
+) -> tuple[FloatArray, IntArray]:
+    """Return the tables that a look changes, shape [I, P, S], and the rows whose they are, shape [I].
 
     Args:
-        tables: What is known of the registers in each row, shape [R, P, S]; changed in place.
-        in_view: The register in each slot, shape [R, J].
-        shown: The probability of each symbol in each register of each table, shape [K, P, S].
-        of: Owner and table of each row.
+        rows: Repeated symbols and revealed registers, the last two of ``events``, are added.
+        known: What is known, and so shown, in each table.
+        registers: The register in each slot of each pose, shape [P', J].
         seen: The symbol in each slot, of each owner, shape [H, J].
-        truth: The probability that the look was not wrong, shape [R].
-        events: Of each row, shape [R, 4]; repeated symbols and revealed registers, the last two, are added.
+        truth: The probability that the look was not wrong, of each row, shape [R].
         repeat: κ.
     """
-    owner, number = of
-    n_symbols = tables.shape[2]
-    for row in range(len(tables)):
+    owner, _, pose, _, of_row, events = rows
+    contents, shown = known
+    n_symbols = contents.shape[2]
+    tables = np.empty((len(owner), contents.shape[1], n_symbols))
+    changed, n_changed = np.empty(len(owner), np.int64), 0
+    for row in range(len(owner)):
+        if truth[row] <= SAME:
+            continue
+        table, is_known = tables[n_changed], True
+        table[:] = contents[of_row[row]]
         for slot in range(seen.shape[1]):
-            register, symbol = in_view[row, slot], seen[owner[row], slot]
-            known, rest = tables[row, register, symbol], 0.0
+            # What shows nothing but what is known for certain leaves a table as it is.
+            is_known = is_known and table[registers[pose[row], slot], seen[owner[row], slot]] > 1.0 - SAME
+        for slot in range(seen.shape[1]):
+            register, symbol = registers[pose[row], slot], seen[owner[row], slot]
+            before, rest = table[register, symbol], 0.0
             for each in range(n_symbols):
-                rest += tables[row, register, each]
-                tables[row, register, each] *= 1.0 - truth[row]
-            tables[row, register, symbol] += truth[row]
-            expected = shown[number[row], register, symbol]
-            revealed = truth[row] * (1.0 - known / max(expected, _TINY))
+                rest += table[register, each]
+                table[register, each] *= 1.0 - truth[row]
+            table[register, symbol] += truth[row]
+            expected = shown[of_row[row], register, symbol]
+            revealed = truth[row] * (1.0 - before / max(expected, TINY))
             from_all = repeat / n_symbols * max(1.0 - rest, 0.0)
-            events[row, 2] += revealed * min(from_all / max(expected - known, _TINY), 1.0)
+            events[row, 2] += revealed * min(from_all / max(expected - before, TINY), 1.0)
             events[row, 3] += revealed
+        if not is_known:
+            changed[n_changed] = row
+            n_changed += 1
+    return tables[:n_changed], changed[:n_changed]
 
 
 @compiled
-def merge_rows(
-    order: IntArray, key: IntArray, weight: FloatArray, table: IntArray, events: FloatArray, contents: FloatArray
-) -> tuple[IntArray, FloatArray, IntArray, FloatArray, FloatArray, IntArray]:
-    """Make one row of those with the same key, whose table has their mean, and keep each different table once.
+def merged(
+    rows: Rows, known: Known, tables: FloatArray, changed: IntArray, sizes: tuple[int, int], repeat: float
+) -> tuple[Rows, Known]:
+    """Make one row of those with the same owner, start and pose, and keep each different table once.
 
     Args:
-        order: Of the rows by their key, shape [R].
-        key: Shape [R].
-        weight: Shape [R].
-        table: Shape [R].
-        events: Shape [R, 4].
-        contents: All tables, shape [K, P, S].
+        rows: With tables as they were.
+        known: What is known, and so shown, in each table.
+        tables: New ones, shape [I, P, S].
+        changed: Index of the row that each belongs to, shape [I].
+        sizes: How many starts and poses there are.
+        repeat: κ.
 
     Returns:
-        The last of the rows that each new one is made of, the weights, tables and events of these, the contents of all
-        tables that are left, and which of the old ones those are that come first.
+        The rows, whose tables are the mean of those that each is made of, and the tables that are left.
     """
-    n_rows, n_old, n_new = len(order), len(contents), 0
-    begins, weights, tables = np.empty(n_rows, np.int64), np.zeros(n_rows), np.empty(n_rows, np.int64)
+    owner, start, pose, weight, of_row, events = rows
+    contents, shown = known
+    n_starts, n_poses = sizes
+    n_rows, n_old, n_new = len(owner), len(contents), 0
+    everything = np.empty((n_old + len(tables), contents.shape[1], contents.shape[2]))
+    everything[:n_old] = contents
+    everything[n_old:] = tables
+    table, key = of_row.copy(), np.empty(n_rows, np.int64)
+    for index in range(len(changed)):
+        table[changed[index]] = n_old + index
+    for row in range(n_rows):
+        key[row] = (owner[row] * n_starts + start[row]) * n_poses + pose[row]
+    order = np.argsort(key, kind="mergesort")
+    begins, weights, numbers = np.empty(n_rows, np.int64), np.zeros(n_rows), np.empty(n_rows, np.int64)
     last = np.empty(n_rows, np.int64)
-    expected, is_used, n_mixed = np.zeros((n_rows, events.shape[1])), np.zeros(n_old, np.bool_), 0
+    expected, is_used, n_mixed = np.zeros((n_rows, events.shape[1])), np.zeros(len(everything), np.bool_), 0
     place = 0
     while place < n_rows:
         first, is_mixed = place, False
@@ -184,32 +204,128 @@ def merge_rows(
             place += 1
         for again in range(first, place):
             member = order[again]
-            expected[n_new] += weight[member] / max(weights[n_new], _LEAST) * events[member]
-        tables[n_new] = -1 if is_mixed else table[order[first]]
+            share = weight[member] / max(weights[n_new], _LEAST)
+            for event in range(events.shape[1]):
+                expected[n_new, event] += share * events[member, event]
+        numbers[n_new] = -1 if is_mixed else table[order[first]]
         if is_mixed:
             n_mixed += 1
         else:
-            is_used[tables[n_new]] = True
+            is_used[numbers[n_new]] = True
         begins[n_new], last[n_new] = first, order[place - 1]
         n_new += 1
-    used, number, n_left = np.empty(n_old, np.int64), np.empty(n_old, np.int64), 0
-    for old in range(n_old):
+    number, n_left = np.empty(len(everything), np.int64), 0
+    left = np.zeros((is_used.sum() + n_mixed, contents.shape[1], contents.shape[2]))
+    shown_left = np.empty_like(left)
+    for old in range(len(everything)):
         if is_used[old]:
-            used[n_left], number[old] = old, n_left
+            left[n_left], number[old] = everything[old], n_left
+            if old < n_old:
+                shown_left[n_left] = shown[old]
+            else:
+                show(everything[old], repeat, shown_left[n_left])
             n_left += 1
-    left = np.zeros((n_left + n_mixed, contents.shape[1], contents.shape[2]))
-    used = used[:n_left]
-    for old in range(n_left):
-        left[old] = contents[used[old]]
     for new in range(n_new):
-        if tables[new] >= 0:
-            tables[new] = number[tables[new]]
+        if numbers[new] >= 0:
+            numbers[new] = number[numbers[new]]
             continue
         for place in range(begins[new], n_rows):
             member = order[place]
             if key[member] != key[last[new]]:
                 break
-            left[n_left] += weight[member] / max(weights[new], _LEAST) * contents[table[member]]
-        tables[new] = n_left
+            add(weight[member] / max(weights[new], _LEAST), everything[table[member]], left[n_left])
+        show(left[n_left], repeat, shown_left[n_left])
+        numbers[new] = n_left
         n_left += 1
-    return last[:n_new], weights[:n_new], tables[:n_new], expected[:n_new], left, used
+    last = last[:n_new]
+    kept = (owner[last], start[last], pose[last], weights[:n_new], numbers[:n_new], expected[:n_new])
+    return kept, (left, shown_left)
+
+
+@compiled_within
+def add(share: float, contents: FloatArray, total: FloatArray) -> None:
+    """Add a share of a table to another."""
+    for register in range(contents.shape[0]):
+        for symbol in range(contents.shape[1]):
+            total[register, symbol] += share * contents[register, symbol]
+
+
+@compiled_within
+def show(contents: FloatArray, repeat: float, shown: FloatArray) -> None:
+    """Fill in the probability of each symbol in each register of a table, as ``symbol_probabilities`` has it."""
+    n_registers, n_symbols = contents.shape
+    absent = np.ones(n_symbols)
+    for register in range(n_registers):
+        for symbol in range(n_symbols):
+            absent[symbol] *= max(1.0 - contents[register, symbol], TINY)
+    for register in range(n_registers):
+        known, total = 0.0, 0.0
+        for symbol in range(n_symbols):
+            known += contents[register, symbol]
+            shown[register, symbol] = absent[symbol] / max(1.0 - contents[register, symbol], TINY)
+            total += shown[register, symbol]
+        rest = max(1.0 - known, 0.0)
+        for symbol in range(n_symbols):
+            drawn = (1.0 - repeat) * (shown[register, symbol] / total) + repeat / n_symbols
+            shown[register, symbol] = contents[register, symbol] + rest * drawn
+
+
+@compiled
+def follow(
+    rows: Rows,
+    known: Known,
+    structure: tuple[IntArray, IntArray, FloatArray, int],
+    actions: IntArray,
+    seen: IntArray,
+    rates: tuple[float, float, float, float],
+    log_evidence: FloatArray,
+    log_weights: FloatArray,
+) -> tuple[Rows, Known]:
+    """Take in looks that showed every slot, and the actions between them.
+
+    Args:
+        rows: What is believed.
+        known: What is known, and so shown, in each table.
+        structure: Successors of each pose [P', A], the register in each slot of each pose [P', J], 1 where these are
+            different, else 0, of each pose [P'], and how many starts there are.
+        actions: Of each owner between the looks, shape [T − 1, H].
+        seen: The symbol in each slot at each look, of each owner, shape [T, H, J].
+        rates: Of slips, of wrong looks and of one that shows a pattern, and κ.
+        log_evidence: ln p(what was seen | owner), shape [H]; that of the looks is added.
+        log_weights: ln of the weight of each owner, shape [H]; of shape [0] if each is a trial of its own.
+    """
+    successors, registers, possible, n_starts = structure
+    slip, wrong, wrong_pattern, repeat = rates
+    for look in range(len(seen)):
+        if look > 0:
+            rows = act(rows, successors, actions[look - 1], slip)
+        owner, start, pose, weight, table, events = rows
+        in_view = registers[pose]
+        probability = probability_of_look(owner, table, in_view, possible[pose], known[1], seen[look])
+        wrong_look = np.full(len(log_evidence), wrong_pattern)
+        kept, truth, weight = weigh(owner, weight, ((1.0 - wrong) * probability, wrong_look), log_evidence, log_weights)
+        rows = (owner[kept], start[kept], pose[kept], weight, table[kept], events[kept])
+        rows[5][:, 1] += 1.0 - truth
+        tables, changed = reveal(rows, known, registers, seen[look], truth, repeat)
+        rows, known = merged(rows, known, tables, changed, (n_starts, len(registers)), repeat)
+    return rows, known
+
+
+@compiled
+def act(rows: Rows, successors: IntArray, actions: IntArray, slip: float) -> Rows:
+    """Move each row by the action of its owner, and leave a second one behind for a slip, after all that moved."""
+    owner, start, pose, weight, table, events = rows
+    n_rows = len(owner)
+    moved = pose.copy()
+    for row in range(n_rows):
+        moved[row] = successors[pose[row], actions[owner[row]]]
+    stayed = events.copy()
+    stayed[:, 0] += 1.0
+    return (
+        np.concatenate((owner, owner)),
+        np.concatenate((start, start)),
+        np.concatenate((moved, pose)),
+        np.concatenate((weight * (1.0 - slip), weight * slip)),
+        np.concatenate((table, table)),
+        np.concatenate((events, stayed)),
+    )

@@ -1,0 +1,34 @@
+"""Loops of the filter over pose and contents: many looks in one call, and what tables show, as NumPy has it."""
+
+import numpy as np
+import pytest
+
+from atg_fg.learning.pose_filter import PoseFilter
+from atg_fg.learning.rates import Rates
+from atg_fg.learning.raw_trials import side_by_side
+from atg_fg.learning.register_contents import symbol_probabilities
+from tests.learning.worlds import BOX, RING, RING_WORLD, objects_of, trial_of
+
+ALPHABET = RING_WORLD.alphabet
+OFTEN = Rates(slip=0.05, wrong=0.02, repeat=0.05)
+
+
+@pytest.mark.parametrize("structure", [RING, BOX], ids=["ring", "box"])
+@pytest.mark.parametrize("rivals", [False, True])
+def test_looks_at_once_are_looks_one_by_one(structure, rivals):
+    rng = np.random.default_rng(3)
+    contents = [rng.permutation(5)[: structure.n_registers].tolist() for _ in range(6)]
+    trials = [trial_of(each, 5, rng, slip=0.2, wrong=0.1) for each in objects_of(structure, contents)]
+    symbols, actions = side_by_side(trials)
+    known = np.eye(5)[np.array(contents)] * rng.choice([0.0, 0.6, 1.0], (6, 1, 1))
+    weights = np.log(np.full(6, 1 / 6)) if rivals else None
+    at_once, one_by_one = (PoseFilter(structure.poses(), known, OFTEN, ALPHABET, weights) for _ in range(2))
+    at_once.follow(np.ascontiguousarray(actions.T), np.ascontiguousarray(symbols.transpose(1, 0, 2)))
+    for look in range(symbols.shape[1]):
+        if look:
+            one_by_one.act_apart(np.ascontiguousarray(actions[:, look - 1]))
+        one_by_one.observe_pattern(symbols[:, look])
+    for own, other in zip(at_once.rows, one_by_one.rows, strict=True):
+        np.testing.assert_array_equal(own, other)
+    np.testing.assert_array_equal(at_once.log_evidence, one_by_one.log_evidence)
+    np.testing.assert_allclose(at_once._shown, symbol_probabilities(at_once._contents, OFTEN.repeat), rtol=1e-12)
