@@ -6,25 +6,25 @@ import pytest
 from tests import dask_cluster
 
 #: Files that take longest, in the order in which workers begin them, before all others: so none is left with a long one
-#: at the end. Where nothing is compiled yet, the first one compiles most loops of learning; those that use them, too,
-#: come after others that do not, so that two workers never compile the same.
+#: at the end. Where nothing is compiled yet, the first one compiles most loops of learning for a minute. Meanwhile
+#: another worker goes through files that use none of them, so that the two do not compile the same.
 LONGEST = (
     "engines/test_learned_structure.py",
-    "sim/worlds/test_robonaut_world.py",
-    "learning/test_learner.py",
-    "sim/worlds/test_stations_world.py",
     "cli/test_endings.py",
-    "report/test_browser.py",
+    "experiments/executors/test_base.py",
+    "sim/worlds/test_stations_world.py",
+    "sim/worlds/test_robonaut_world.py",
     "sim/worlds/test_rendered_world.py",
+    "report/test_browser.py",
+    "cli/test_executors.py",
     "sim/manipulation/test_waypoints.py",
-    "sim/worlds/test_picture_box_world.py",
     "core/test_object_sense.py",
+    "sim/worlds/test_picture_box_world.py",
+    "learning/test_learner.py",
+    "report/test_every_record.py",
+    "unchanged/test_unchanged.py",
     "cli/test_live.py",
     "cli/test_recordings.py",
-    "report/test_every_record.py",
-    "experiments/executors/test_base.py",
-    "cli/test_executors.py",
-    "unchanged/test_unchanged.py",
     "test_torture.py",
     "test_planted_faults.py",
     "test_tour.py",
