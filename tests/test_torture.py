@@ -76,6 +76,7 @@ def test_the_corpus_is_small_and_leads_to_no_fault(tmp_path: Path) -> None:
     assert kinds == set(KINDS)
 
 
+@pytest.mark.slow
 def test_a_writer_that_does_not_sync_is_found_out(monkeypatch: pytest.MonkeyPatch) -> None:
     """The simulated power cut can fail: this is what it is for."""
     if library_of_python() is None:
