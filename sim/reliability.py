@@ -12,6 +12,7 @@ from typing import Any, Final
 
 import numpy as np
 
+from atg_fg.core.checks import MANY, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import MISSING, FloatArray
 from atg_fg.core.statistics import wilson_interval
@@ -129,8 +130,7 @@ def run_actions(
     """
     condition_named(condition)
     for name, number in (("actions", n_actions), ("jobs", jobs), ("stations", n_stations)):
-        if number < 1:
-            raise InvalidInputError(f"{name}: {number}; expected a whole number of at least 1")
+        whole_number(number, name, 1, MANY)
     if pictures and n_stations > 1:
         raise InvalidInputError(f"stations: {n_stations}; expected 1 for boxes with pictures")
     robot = None if urdf is None else prepared(urdf)

@@ -12,6 +12,7 @@ import typer
 from rich.table import Table
 
 from atg_fg.cli import options
+from atg_fg.core.checks import MANY, brief
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.display import figures
 from atg_fg.display.success_plots import plot_success
@@ -283,12 +284,12 @@ def parse_actions(text: str) -> list[int]:
         numbers = [int(part) for part in parts]
     except ValueError:
         numbers = []
-    if ":" in text and len(numbers) == 2 and numbers[0] <= numbers[1]:
-        numbers = list(range(numbers[0], numbers[1] + 1))
-    elif ":" in text:
-        numbers = []
-    if not numbers or min(numbers) < 1 or len(set(numbers)) != len(numbers):
-        raise InvalidInputError(f"--actions: {text!r}; expected first:last or a list such as 4,6,10, all at least 1")
+    if ":" in text:
+        numbers = [*range(max(numbers[0], 0), min(numbers[1], MANY + 1) + 1)] if len(numbers) == 2 else []
+    if not numbers or min(numbers) < 1 or max(numbers) > MANY or len(set(numbers)) != len(numbers):
+        raise InvalidInputError(
+            f"--actions: {brief(text)}; expected first:last or a list such as 4,6,10, all from 1 to {MANY}"
+        )
     return numbers
 
 

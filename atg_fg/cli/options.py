@@ -16,6 +16,7 @@ import typer
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
 
 from atg_fg.cli.terminal import PlainConsole
+from atg_fg.core.checks import MANY
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.table import Table
@@ -83,9 +84,9 @@ Settled = Annotated[
     ),
 ]
 Seed = Annotated[int, typer.Option(min=0, help="Seed; test number k uses seed + k.", rich_help_panel=TRIALS)]
-Actions = Annotated[int, typer.Option(min=1, help="Actions a trial.", rich_help_panel=TRIALS)]
-Tests = Annotated[int, typer.Option(min=1, max=100_000, help="Number of tests.", rich_help_panel=TRIALS)]
-Trials = Annotated[int, typer.Option(min=1, help="Trials a test.", rich_help_panel=TRIALS)]
+Actions = Annotated[int, typer.Option(min=1, max=MANY, help="Actions a trial.", rich_help_panel=TRIALS)]
+Tests = Annotated[int, typer.Option(min=1, max=MANY, help="Number of tests.", rich_help_panel=TRIALS)]
+Trials = Annotated[int, typer.Option(min=1, max=MANY, help="Trials a test.", rich_help_panel=TRIALS)]
 Jobs = Annotated[
     int | None,
     typer.Option(

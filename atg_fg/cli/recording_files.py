@@ -165,5 +165,7 @@ def simulate(
     Example: atg-fg recordings simulate -o looks.csv --wrong 0.2 --missing 0.1 --world-option confidences=true
     """
     own = options.world_options(slip, wrong, missing, own=world_option)
+    for given in {"seed", "objects_seed"} & own.keys():
+        raise InvalidInputError(f"--world-option: {given!r}; expected it as --{given.replace('_', '-')}")
     write_recording(simulated_recording(world, objects, trials, actions, seed, objects_seed, **own), output)
     say(f"saved: {output}")

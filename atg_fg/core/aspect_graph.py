@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 import numpy as np
 
 from atg_fg.core.assumptions import MAX_NUMBER, Assumptions
-from atg_fg.core.checks import whole_number
+from atg_fg.core.checks import instance, plain_text, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.object_sense import Moments, check_measured
 from atg_fg.core.open_alphabets import Relabelling
@@ -41,10 +41,8 @@ class AspectTransitionGraph:
     """
 
     def __init__(self, name: str, assumptions: Assumptions) -> None:
-        if not isinstance(name, str) or not name:
-            raise InvalidInputError(f"name of an ATG: {name!r}; expected a text that is not empty")
-        self.name = name
-        self.assumptions = assumptions
+        self.name = plain_text(name, "name of an ATG")
+        self.assumptions = instance(assumptions, "assumptions", Assumptions)
         self._aspect_of: dict[int, int] = {}
         self._counts: dict[Edge, int] = {}
         self._count_table: IntArray | None = None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence, Set
-from typing import Any, Final
+from typing import Any, Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,8 +13,13 @@ from atg_fg.core.errors import InvalidInputError
 
 #: Numbers of arrays are not greater, so that sums of their squares are numbers, too.
 GREATEST: Final = 1e100
+#: More trials, actions or objects in one go are refused: memory is taken for all of them before the first is done.
+MANY: Final = 100_000
+#: A seed is not greater: as much as ``secrets.randbits(128)`` gives, and few enough digits to be written down.
+GREATEST_SEED: Final = 2**128 - 1
 #: Names that an error message tells.
 _LISTED: Final = 24
+Kind = TypeVar("Kind")
 
 
 def whole_number(value: Any, place: str, least: int = 0, most: int | None = None) -> int:
@@ -134,6 +139,18 @@ def listed(names: Iterable[str]) -> str:
     known = list(names)
     more = f" and {len(known) - _LISTED} others" if len(known) > _LISTED else ""
     return ", ".join(name if len(name) <= 60 else f"{name[:57]}..." for name in known[:_LISTED]) + more
+
+
+def instance(value: Any, place: str, kind: type[Kind]) -> Kind:
+    """Return ``value``, or raise ``InvalidInputError`` unless it is of this class."""
+    if not isinstance(value, kind):
+        raise InvalidInputError(f"{place}: {brief(value)}; expected {kind.__name__}")
+    return value
+
+
+def title_or(value: Any, usual: str) -> str:
+    """Return a title that was given, ``usual`` if none was, or raise ``InvalidInputError`` if it is no text."""
+    return usual if value is None or (isinstance(value, str) and not value) else plain_text(value, "title")
 
 
 def brief(value: Any) -> str:

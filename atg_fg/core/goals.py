@@ -9,6 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from atg_fg.core.checks import brief, instance
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.patterns import Detection, PatternAlphabet, read_only
 
@@ -29,14 +30,16 @@ class Goal:
     symbols: Detection
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "symbols", self.alphabet.check_detection(self.symbols, "goal"))
+        object.__setattr__(
+            self, "symbols", instance(self.alphabet, "alphabet", PatternAlphabet).check_detection(self.symbols, "goal")
+        )
         if not any(symbol is not None for symbol in self.symbols):
             raise InvalidInputError(f"goal: {list(self.symbols)!r}; expected a symbol in at least one slot")
 
     @classmethod
     def of_slots(cls, alphabet: PatternAlphabet, wanted: Mapping[str, int]) -> Goal:
         """Return the goal with the symbols ``wanted`` by the names of their slots, such as ``{"front": 7}``."""
-        for slot in wanted:
+        for slot in instance(wanted, "wanted", Mapping):  # type: ignore[type-abstract]
             if slot not in alphabet.slots:
                 raise unknown_name("slot of a goal", slot, alphabet.slots)
         return cls(alphabet, tuple(wanted.get(slot) for slot in alphabet.slots))
@@ -49,10 +52,10 @@ class Goal:
             InvalidInputError: Not of this form, or as for ``Goal``.
         """
         wanted: dict[str, int] = {}
-        for part in text.split(","):
+        for part in instance(text, "goal", str).split(","):
             slot, separator, symbol = (piece.strip() for piece in part.partition("="))
-            if not separator or not symbol.isdecimal() or slot in wanted:
-                raise InvalidInputError(f"goal: {text!r}; expected slot=symbol, such as front=7 or front=7,top=3")
+            if not separator or not symbol.isdecimal() or len(symbol) > 20 or slot in wanted:
+                raise InvalidInputError(f"goal: {brief(text)}; expected slot=symbol, such as front=7 or front=7,top=3")
             wanted[slot] = int(symbol)
         return cls.of_slots(alphabet, wanted)
 

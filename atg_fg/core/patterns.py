@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, Final, TypeAlias, TypeVar
@@ -16,7 +16,7 @@ from typing import Any, Final, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from atg_fg.core.checks import brief, distinct_names, listed, plain_text, whole_number
+from atg_fg.core.checks import brief, distinct_names, listed, plain_text, sequence, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.slot_checks import check_confidences, check_slots
 
@@ -133,7 +133,7 @@ class PatternAlphabet:
         Raises:
             InvalidInputError: The alphabet is not open, and lacks one; or one is no name.
         """
-        if isinstance(names, str) or not isinstance(names, Iterable):
+        if isinstance(names, (str, Mapping, Set)) or not isinstance(names, Iterable):  # a set has no order
             raise InvalidInputError(f"names of symbols: {brief(names)}; expected names")
         names = [plain_text(name, "name of a symbol") for name in names]
         new = [name for name in dict.fromkeys(names) if name not in self._number_of]
@@ -212,7 +212,7 @@ class PatternAlphabet:
 
     def check_detection(self, detection: Sequence[int | str | None], place: str = "detection") -> Detection:
         """Return the numbers of the symbols of ``detection``, or raise ``InvalidInputError`` naming ``place``."""
-        if isinstance(detection, str) or not hasattr(detection, "__len__") or len(detection) != len(self.slots):
+        if len(sequence(detection, place)) != len(self.slots):
             raise InvalidInputError(
                 f"{place}: {brief(detection)}; expected one entry for each of {len(self.slots)} slots: "
                 f"{listed(self.slots)}"
@@ -289,7 +289,7 @@ class Evidence:
             InvalidInputError: The detection does not fit the alphabet, or the confidences do not fit the detection.
         """
         # Most looks are whole, without confidences, and not the first of their kind. True and 1.0 are no symbols.
-        if type(detection) is tuple and not confidences and set(map(type, detection)) == {int}:
+        if type(detection) is type(confidences) is tuple and not confidences and set(map(type, detection)) == {int}:
             found = alphabet._whole_looks.get(detection)
             if found is not None:
                 return found

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from atg_fg.core.checks import brief, sequence
+from atg_fg.core.checks import brief, number, sequence
 from atg_fg.core.errors import InvalidInputError
 
 #: Greatest weight of a slot, and its inverse the least, that is left on its scale: products of 16 are still numbers.
@@ -56,8 +55,4 @@ def check_confidences(
     """Return confidences as a tuple, or raise ``InvalidInputError`` naming ``place``; none at all are as good."""
     if len(sequence(confidences, place)) not in (0, n_slots):
         raise InvalidInputError(f"{place}: {len(confidences)}; expected one for each of {n_slots} slots, or none")
-    for value in confidences:
-        is_number = isinstance(value, (int, float, np.number)) and not isinstance(value, bool)
-        if value is not None and not (is_number and math.isfinite(value)):
-            raise InvalidInputError(f"{place}: {brief(value)}; expected finite numbers or null")
-    return tuple(None if value is None else float(value) for value in confidences)
+    return tuple(None if value is None else number(value, place) for value in confidences)

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import Final
+from collections.abc import Mapping, Sequence
+from typing import Any, Final, NamedTuple
 
+from atg_fg.core import checks
 from atg_fg.core.errors import InvalidInputError
 
 #: Two-sided 95 % point of the normal distribution.
@@ -76,3 +77,47 @@ def standard_error(values: Sequence[float]) -> float | None:
         return None
     centre = math.fsum(values) / len(values)
     return math.sqrt(math.fsum((value - centre) ** 2 for value in values) / (len(values) - 1) / len(values))
+
+
+class Rate(NamedTuple):
+    """A rate of success, its 95 % interval, and what they are of.
+
+    Attributes:
+        names: Of the policy, or of the world, the noise and the variant.
+        actions: A trial.
+        success: Fraction of trials.
+        low: Lower end of the interval.
+        high: Upper end of the interval.
+    """
+
+    names: tuple[str, ...]
+    actions: float
+    success: float
+    low: float
+    high: float
+
+
+def rates_of(points: Any, place: str, keys: Sequence[str]) -> list[Rate]:
+    """Return what mappings with "actions", "success", "interval95" and names under these keys say.
+
+    Raises:
+        InvalidInputError: There is none, one lacks something, or a value is no name, number or fraction.
+    """
+    found = [_rate(point, f"{place}[{index}]", keys) for index, point in enumerate(checks.sequence(points, place))]
+    if not found:
+        raise InvalidInputError(f"{place}: none given; expected at least one")
+    return found
+
+
+def _rate(point: Any, place: str, keys: Sequence[str]) -> Rate:
+    for key in (*keys, "actions", "success", "interval95"):
+        if key not in checks.instance(point, place, Mapping):  # type: ignore[type-abstract]
+            raise InvalidInputError(f"{place}: {checks.brief(dict(point))}; expected the key {key!r}")
+    ends = f"{place}, key 'interval95'"
+    if len(checks.sequence(point["interval95"], ends)) != 2:
+        raise InvalidInputError(f"{ends}: {checks.brief(point['interval95'])}; expected two numbers")
+    names = tuple(checks.plain_text(point[key], f"{place}, key {key!r}") for key in keys)
+    fractions = [checks.number(point["success"], f"{place}, key 'success'", 0, 1)]
+    fractions += [checks.number(end, ends, 0, 1) for end in point["interval95"]]
+    checks.number(point["actions"], f"{place}, key 'actions'", 0, 1e9)
+    return Rate(names, point["actions"], *fractions)

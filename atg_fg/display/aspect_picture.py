@@ -9,6 +9,8 @@ from typing import TYPE_CHECKING, Any, Final, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from atg_fg.core.checks import brief, floats, instance
+from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import FloatArray, PatternAlphabet
 from atg_fg.display.figures import GREY, INK, PALETTE
 
@@ -48,6 +50,16 @@ class Look:
     linestyle: str = "solid"
     strength: float = 1.0
     side: str = "#d8d8d8"
+
+
+def check_images(images: Any) -> None:
+    """Raise ``InvalidInputError`` unless these are images of symbols that can be drawn, or none."""
+    for symbol, image in instance({} if images is None else images, "symbol images", Mapping).items():  # type: ignore[type-abstract]
+        pixels = floats(image, f"image of symbol {brief(symbol)}", "grey or RGB pixels")
+        if pixels.ndim not in (2, 3) or 0 in pixels.shape or pixels.shape[2:] not in ((), (3,)):
+            raise InvalidInputError(
+                f"image of symbol {brief(symbol)}: shape {pixels.shape}; expected [rows, columns] or [rows, columns, 3]"
+            )
 
 
 def action_color(action: int) -> str:

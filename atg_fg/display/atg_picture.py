@@ -13,11 +13,20 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 
 from atg_fg.core.aspect_graph import AspectTransitionGraph, Edge
+from atg_fg.core.checks import brief, instance, sequence, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import FloatArray
-from atg_fg.display.aspect_picture import INCHES_PER_UNIT, Images, action_color, draw_arrow, draw_aspect, draw_frame
+from atg_fg.display.aspect_picture import (
+    INCHES_PER_UNIT,
+    Images,
+    action_color,
+    check_images,
+    draw_arrow,
+    draw_aspect,
+    draw_frame,
+)
 from atg_fg.display.figures import GREY, figure_class, plot_style
-from atg_fg.display.plot_parts import say_as_it_is
+from atg_fg.display.plot_parts import named_legend
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -45,14 +54,17 @@ def draw_atg(
         path: Counted transitions to draw strong, such as the way to a goal, while the others are pale.
 
     Raises:
-        InvalidInputError: There is no aspect ``highlight``, or a transition of ``path`` was never counted.
+        InvalidInputError: There is no aspect ``highlight``, a transition of ``path`` was never counted, or an image is
+            none.
         MissingDependencyError: matplotlib is not installed.
     """
-    if highlight is not None and not 0 <= highlight < graph.n_known:
-        raise InvalidInputError(f"highlight: aspect {highlight}; expected one of the {graph.n_known} known aspects")
-    for edge in path:
-        if edge not in graph.counts:
-            raise InvalidInputError(f"path: transition {edge}; expected one that {graph.name!r} has counted")
+    instance(graph, "ATG", AspectTransitionGraph)
+    if highlight is not None:
+        whole_number(highlight, "highlight, a known aspect", 0, graph.n_known - 1)
+    for edge in sequence(path, "path"):
+        if not isinstance(edge, tuple) or edge not in graph.counts:
+            raise InvalidInputError(f"path: transition {brief(edge)}; expected one that {graph.name!r} has counted")
+    check_images(symbol_images)
     places, radius = _places(graph.n_known)
     extent = radius + 1.0
     with plot_style():
@@ -149,11 +161,8 @@ def _draw_collection(axes: Axes, graph: AspectTransitionGraph) -> None:
 def _draw_legend(figure: Figure, graph: AspectTransitionGraph) -> None:
     from matplotlib.lines import Line2D
 
-    handles = [
-        Line2D([], [], color=action_color(i), linewidth=2, label=name)
-        for i, name in enumerate(graph.assumptions.actions)
-    ]
-    handles.append(Line2D([], [], color=GREY, linewidth=1.3, linestyle=(0, (1, 2)), label="not yet tried"))
-    legend = figure.legend(handles=handles, loc="upper center", ncols=len(handles), title=graph.name, fontsize=9)
+    names = [*graph.assumptions.actions, "not yet tried"]
+    handles = [Line2D([], [], color=action_color(i), linewidth=2) for i in range(len(names) - 1)]
+    handles.append(Line2D([], [], color=GREY, linewidth=1.3, linestyle=(0, (1, 2))))
+    legend = named_legend(figure, names, handles, loc="upper center", ncols=len(names), title=graph.name, fontsize=9)
     legend.get_title().set_fontweight("bold")
-    say_as_it_is(legend)

@@ -12,7 +12,7 @@ from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import FloatArray, PatternAlphabet
 from atg_fg.display.aspect_picture import INCHES_PER_UNIT, Images, Look, action_color, draw_arrow, draw_aspect
 from atg_fg.display.figures import GREY, INK, figure_class, plot_style
-from atg_fg.display.plot_parts import say_as_it_is
+from atg_fg.display.plot_parts import named_legend
 from atg_fg.display.ring_layout import Node, ring_layout
 from atg_fg.learning.completion import OBSERVED, PREDICTED, UNKNOWN, CompletedGraph, statuses
 
@@ -150,18 +150,15 @@ def _draw_head(figure: Figure, graph: CompletedGraph, assumptions: Assumptions) 
     title = f"{graph.graph['name']}: {counts}"
     if graph.graph["poses"]:
         title += f"; follows the structure with p {probability_text(graph.graph['follows'])}"
-    handles = [
-        Line2D([], [], color=action_color(index), linewidth=2, label=name)
-        for index, name in enumerate(assumptions.actions)
-    ]
-    handles.append(Line2D([], [], color=INK, linewidth=2.0, label="observed"))
+    names = [*assumptions.actions, "observed"]
+    handles = [Line2D([], [], color=action_color(index), linewidth=2) for index in range(len(names) - 1)]
+    handles.append(Line2D([], [], color=INK, linewidth=2.0))
     certainties = [data["probability"] for _, _, data in graph.edges(data=True) if not data["observed"]]
     usual = _usual_probability(graph)
     if numbers[PREDICTED] or numbers[UNKNOWN] or certainties:
         told = [f"aspects p {usual}"] if usual else []
         told += [f"transitions p {probability_text(min(certainties))}"] if certainties else []
-        label = f"predicted ({', '.join(told)})" if told else "predicted"
-        handles.append(Line2D([], [], color=GREY, linewidth=1.0, linestyle=_DASHED, label=label))
-    legend = figure.legend(handles=handles, loc="upper center", ncols=len(handles), title=title, fontsize=9)
+        names.append(f"predicted ({', '.join(told)})" if told else "predicted")
+        handles.append(Line2D([], [], color=GREY, linewidth=1.0, linestyle=_DASHED))
+    legend = named_legend(figure, names, handles, loc="upper center", ncols=len(names), title=title, fontsize=9)
     legend.get_title().set_fontweight("bold")
-    say_as_it_is(legend)

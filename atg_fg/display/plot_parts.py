@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
@@ -11,6 +11,7 @@ from atg_fg.core.patterns import FloatArray
 from atg_fg.display.figures import figure_class
 
 if TYPE_CHECKING:
+    from matplotlib.artist import Artist
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.legend import Legend
@@ -78,16 +79,22 @@ def _apart(values: FloatArray, gap: float, low: float, high: float) -> FloatArra
     return result
 
 
-def legend_above(axes: Axes) -> None:
+def legend_above(axes: Axes, names: Sequence[str], handles: Sequence[Artist]) -> None:
     """Put the legend in one row between plot and title."""
-    legend = axes.legend(
-        loc="lower left", bbox_to_anchor=(-0.01, 1.0), ncols=6, borderpad=0.2, handletextpad=0.3,
+    named_legend(
+        axes, names, handles, loc="lower left", bbox_to_anchor=(-0.01, 1.0), ncols=6, borderpad=0.2, handletextpad=0.3,
         columnspacing=1.2, numpoints=1,
     )  # fmt: skip
-    say_as_it_is(legend)
 
 
-def say_as_it_is(legend: Legend) -> None:
-    """Let the names in a legend be no formulas, whatever dollars they hold."""
+def named_legend(owner: Axes | Figure, names: Sequence[str], handles: Sequence[Any], **options: Any) -> Legend:
+    """Make a legend with names as they are, whatever dollars they hold or underscores they begin with.
+
+    matplotlib takes text between dollars for a formula, and leaves out what begins with an underscore.
+    """
+    legend: Legend = owner.legend(handles, ["name"] * len(handles), **options)
+    for text, name in zip(legend.get_texts(), names, strict=True):
+        text.set_text(name)
     for text in (legend.get_title(), *legend.get_texts()):
         text.set_parse_math(False)
+    return legend

@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 
+from atg_fg.core.checks import brief, plain_text, sequence, title_or
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import FloatArray
-from atg_fg.core.statistics import wilson_interval
+from atg_fg.core.statistics import Rate, rates_of, wilson_interval
 from atg_fg.display.figures import GREY, INK, PALETTE, figure_class, plot_style
-from atg_fg.display.plot_parts import LineEnd, figure_with_axes, label_ends, plot_curve, say_as_it_is
+from atg_fg.display.plot_parts import LineEnd, figure_with_axes, label_ends, named_legend, plot_curve
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -44,23 +45,24 @@ def plot_success(
         MissingDependencyError: matplotlib is not installed.
     """
     if isinstance(results, Mapping):
-        bars = {str(name): _pooled(tests, "success", str(name)) for name, tests in results.items()}
-        return _bars(bars, title or "Success rate")
-    if results and not isinstance(results[0], Mapping):
+        bars = {plain_text(name, "results"): _pooled(tests, "success", name) for name, tests in results.items()}
+        return _bars(bars, title_or(title, "Success rate"))
+    found = sequence(results, "results")
+    if len(found) and not isinstance(found[0], Mapping):
         names = ("identification", "recognition", "success")
-        return _bars({name: _pooled(results, name, "results") for name in names}, title or f"{len(results)} tests")
-    return _figure3(results, title or "Success rate by number of actions")  # type: ignore[arg-type]
+        return _bars({name: _pooled(found, name, "results") for name in names}, title_or(title, f"{len(found)} tests"))
+    return _figure3(rates_of(found, "points", ["policy"]), title_or(title, "Success rate by number of actions"))
 
 
-def _figure3(points: Sequence[Mapping[str, Any]], title: str) -> Figure:
-    curves = _curves(points)
+def _figure3(rates: Sequence[Rate], title: str) -> Figure:
+    curves = {policy: _curve(rates, (policy,)) for policy in dict.fromkeys(rate.names[0] for rate in rates)}
     with plot_style():
         figure, axes = figure_with_axes(6.4, 4.2)
         ends = []
         for rank, (policy, curve) in enumerate(curves.items()):
             color = PALETTE[rank % len(PALETTE)]
-            plot_curve(axes, 100 * curve * [0.01, 1, 1, 1], color, "os^Dvp"[rank % 6])
-            ends.append(LineEnd(100 * float(curve[-1, 1]), policy, color))
+            plot_curve(axes, curve, color, "os^Dvp"[rank % 6])
+            ends.append(LineEnd(float(curve[-1, 1]), policy, color))
         ticks = sorted({float(actions) for curve in curves.values() for actions in curve[:, 0]})
         axes.set(ylim=(0, 100), xlabel="actions per trial", ylabel="success rate (%)")
         axes.set_xticks(ticks if len(ticks) <= 12 else axes.get_xticks())
@@ -76,9 +78,9 @@ def _figure3(points: Sequence[Mapping[str, Any]], title: str) -> Figure:
 
 def _pooled(tests: Sequence[Any], score: str, place: str) -> tuple[float, float, float]:
     """Return the rate of a score over all trials of tests, and its interval."""
-    counts: list[Any] = [getattr(test, score, None) for test in tests]
-    if not counts or None in counts:
-        raise InvalidInputError(f"{place}: {list(tests)!r:.80}; expected test results, at least one")
+    counts: list[Any] = [getattr(test, score, None) for test in sequence(tests, place)]
+    if not counts or not all(isinstance(count, tuple) and len(count) == 2 for count in counts):
+        raise InvalidInputError(f"{place}: {brief(tests)}; expected test results, at least one")
     right, total = sum(count[0] for count in counts), sum(count[1] for count in counts)
     return (right / total if total else 0.0, *wilson_interval(right, total))
 
@@ -109,13 +111,12 @@ def plot_ablation(entries: Sequence[Mapping[str, Any]]) -> Figure:
             ``summarise_ablation`` returns them.
 
     Raises:
-        InvalidInputError: No entries.
+        InvalidInputError: No entries, a key that is missing, or a value that is no name, number or fraction.
         MissingDependencyError: matplotlib is not installed.
     """
-    if not entries:
-        raise InvalidInputError("ablation plot: no entries; expected at least one")
-    panels = list(dict.fromkeys((entry["world"], entry["noise"]) for entry in entries))
-    variants = list(dict.fromkeys(entry["variant"] for entry in entries))
+    rates = rates_of(entries, "entries", ["world", "noise", "variant"])
+    panels = list(dict.fromkeys(rate.names[:2] for rate in rates))
+    variants = list(dict.fromkeys(rate.names[2] for rate in rates))
     n_columns = min(2, len(panels))
     n_rows = -(-len(panels) // n_columns)
     with plot_style():
@@ -123,43 +124,21 @@ def plot_ablation(entries: Sequence[Mapping[str, Any]]) -> Figure:
         all_axes = figure.subplots(n_rows, n_columns, sharex=True, sharey=True, squeeze=False).ravel()
         for axes, (world, noise) in zip(all_axes, panels, strict=False):
             for rank, variant in enumerate(variants):
-                where = {"world": world, "noise": noise, "variant": variant}
-                curve = [entry for entry in entries if where.items() <= dict(entry).items()]
-                if curve:
-                    points = np.array([[each["actions"], each["success"], *each["interval95"]] for each in curve])
-                    points = points[np.argsort(points[:, 0])]
-                    plot_curve(axes, points * [1, 100, 100, 100], PALETTE[rank % len(PALETTE)], "os^Dvp"[rank % 6])
+                curve = _curve(rates, (world, noise, variant))
+                if len(curve):
+                    plot_curve(axes, curve, PALETTE[rank % len(PALETTE)], "os^Dvp"[rank % 6])
             axes.set_title(noise if len({world for world, _ in panels}) == 1 else f"{world}, {noise}", parse_math=False)
             axes.set(ylim=(0, 101), xlabel="actions per trial", ylabel="success rate (%)")
-            axes.set_xticks(sorted({entry["actions"] for entry in entries}))
+            axes.set_xticks(sorted({rate.actions for rate in rates}))
             axes.label_outer()
         for axes in all_axes[len(panels) :]:
             axes.remove()
         lines = [line for line in all_axes[0].get_lines() if line.get_marker() not in ("", "None", None)]
-        say_as_it_is(figure.legend(lines, variants, loc="outside lower center", ncols=len(variants)))
+        named_legend(figure, variants, lines, loc="outside lower center", ncols=len(variants))
     return figure
 
 
-def _curves(points: Sequence[Mapping[str, Any]]) -> dict[str, FloatArray]:
-    """Return by policy its points by actions, shape [points, 4]: actions, success, low and high end."""
-    if not points:
-        raise InvalidInputError("points: none given; expected at least one")
-    rows: dict[str, list[tuple[float, ...]]] = {}
-    for number, point in enumerate(points):
-        for key in ("actions", "policy", "success", "interval95"):
-            if key not in point:
-                raise InvalidInputError(f"points[{number}]: {dict(point)!r}; expected the key {key!r}")
-        rows.setdefault(str(point["policy"]), []).append(_row(point, f"points[{number}]"))
-    return {policy: np.array(sorted(curve)) for policy, curve in rows.items()}
-
-
-def _row(point: Mapping[str, Any], place: str) -> tuple[float, ...]:
-    try:
-        low, high = (float(end) for end in point["interval95"])
-        actions, success = float(point["actions"]), float(point["success"])
-    except (TypeError, ValueError):
-        raise InvalidInputError(f"{place}: {dict(point)!r}; expected numbers, two in 'interval95'") from None
-    for key, value in (("success", success), ("interval95", low), ("interval95", high)):
-        if not 0 <= value <= 1:
-            raise InvalidInputError(f"{place}, key {key!r}: {value}; expected a fraction from 0 to 1")
-    return actions, success, low, high
+def _curve(rates: Sequence[Rate], names: tuple[str, ...]) -> FloatArray:
+    """Return the rates of these names by actions, shape [points, 4]: actions, then success, low and high end in %."""
+    rows = [[rate.actions, *(100 * share for share in rate[2:])] for rate in rates if rate.names == names]
+    return np.array(sorted(rows))

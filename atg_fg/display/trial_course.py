@@ -10,6 +10,7 @@ import numpy as np
 from atg_fg.core.actions import AnyAction, told
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.belief import IdentityBelief
+from atg_fg.core.checks import instance
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import FloatArray
 from atg_fg.core.records import TrialRecord
@@ -51,7 +52,7 @@ def course_of(trial: TrialRecord | Inference) -> TrialCourse:
     Raises:
         InvalidInputError: There was no look yet, or the memory has learned since the engine's trial began.
     """
-    course = _of_record(trial) if isinstance(trial, TrialRecord) else _of_inference(trial)
+    course = _of_record(trial) if isinstance(trial, TrialRecord) else _of_inference(instance(trial, "trial", Inference))  # type: ignore[type-abstract]
     if not course.beliefs:
         raise InvalidInputError("trial: nothing seen yet; expected a first look")
     return course

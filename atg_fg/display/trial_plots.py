@@ -9,7 +9,7 @@ import numpy as np
 
 from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.belief import IdentityBelief
-from atg_fg.core.checks import whole_number
+from atg_fg.core.checks import finite_array, instance, number, one_of, plain_text, sequence, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.records import TrialRecord
 from atg_fg.display.atg_picture import draw_atg
@@ -21,6 +21,7 @@ from atg_fg.inference.interface import Inference
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.lines import Line2D
 
 
 def plot_atg(shown: AspectTransitionGraph | TrialRecord | Inference, **options: Any) -> Figure:
@@ -64,10 +65,10 @@ def plot_belief(
         beliefs: Sequence[IdentityBelief] = course.beliefs
         names = course.names if names is None else names
     else:
-        beliefs = trial
+        beliefs = sequence(trial, "beliefs")
     if names is None:
         raise InvalidInputError("names: none given with beliefs; expected one for each remembered object")
-    _check_beliefs(beliefs, names, top)
+    _check_beliefs(beliefs, sequence(names, "names"), top)
     steps = np.arange(len(beliefs))
     objects = np.array([belief.objects for belief in beliefs]).reshape(len(beliefs), len(names))
     unseen = np.array([belief.unseen for belief in beliefs])
@@ -117,20 +118,19 @@ def plot_entropy(
         entropies: Sequence[float] = [belief.entropy for belief in course.beliefs]
         expected, chosen = course.expected, course.chosen
     else:
-        entropies = trial
+        entropies = finite_array(trial, "entropies", (None,), "a number for each look").tolist()
     _check_entropies(entropies, expected, chosen)
     actions = list(dict.fromkeys(action for options in expected for action in options))
     with plot_style():
         figure, axes = figure_with_axes(7.8, 4.1)
-        axes.plot(range(len(entropies)), entropies, color="#555555", marker="o", markersize=4, label="entropy H(O)")
+        handles = axes.plot(range(len(entropies)), entropies, color="#555555", marker="o", markersize=4)
         for rank, action in enumerate(actions):
-            _plot_expected(axes, rank, len(actions), action, expected, chosen)
-        if actions:
-            axes.plot([], [], "o", markersize=7, color=GREY, label="chosen (filled)")
+            handles += _plot_expected(axes, rank, len(actions), action, expected, chosen)
+        handles += axes.plot([], [], "o", markersize=7, color=GREY) if actions else ()
         axes.set(ylabel="entropy (nats)")
         axes.set_ylim(bottom=min(0.0, axes.get_ylim()[0]))
         step_axis(axes, len(entropies))
-        legend_above(axes)
+        legend_above(axes, ["entropy H(O)", *actions, *["chosen (filled)"] * bool(actions)], handles)
         axes.set_title("Entropy of identity, and what each action was expected to leave", pad=28)
     return figure
 
@@ -142,24 +142,30 @@ def _plot_expected(
     action: str,
     expected: Sequence[Mapping[str, float]],
     chosen: Sequence[str],
-) -> None:
-    """Mark what one action was expected to leave, just left of its outcome and apart from the others."""
+) -> list[Line2D]:
+    """Mark what one action was expected to leave, just left of its outcome and apart from the others.
+
+    The marks of where it was not taken are returned, for the legend.
+    """
     color, shape = PALETTE[rank % len(PALETTE)], "s^Dvp*"[rank % 6]
     shift = 0.16 + 0.5 * (n_actions - 1 - rank) / max(n_actions, 3)
+    lines: list[Line2D] = []
     for taken in (False, True):
         steps = [t for t, options in enumerate(expected) if action in options and (chosen[t] == action) == taken]
-        axes.plot(
+        lines += axes.plot(
             [t + 1 - shift for t in steps], [expected[t][action] for t in steps], shape, zorder=4,
             markersize=7 if taken else 5, markeredgecolor=color, markerfacecolor=color if taken else "white",
-            label=None if taken else action,
         )  # fmt: skip
+    return lines[:1]
 
 
 def _check_beliefs(beliefs: Sequence[IdentityBelief], names: Sequence[str], top: int) -> None:
-    if not beliefs:
+    if not len(beliefs):
         raise InvalidInputError("beliefs: none given; expected at least one")
+    for name in names:
+        plain_text(name, "names")
     for step, belief in enumerate(beliefs):
-        if len(belief.objects) != len(names):
+        if len(instance(belief, f"beliefs[{step}]", IdentityBelief).objects) != len(names):
             raise InvalidInputError(
                 f"beliefs[{step}]: {len(belief.objects)} objects; expected one for each of {len(names)} names"
             )
@@ -169,11 +175,13 @@ def _check_beliefs(beliefs: Sequence[IdentityBelief], names: Sequence[str], top:
 def _check_entropies(
     entropies: Sequence[float], expected: Sequence[Mapping[str, float]], chosen: Sequence[str]
 ) -> None:
-    if not len(entropies) == len(expected) + 1 == len(chosen) + 1:
+    if not len(entropies) == len(sequence(expected, "expected")) + 1 == len(sequence(chosen, "chosen")) + 1:
         raise InvalidInputError(
             f"entropies: {len(entropies)} with {len(expected)} expected and {len(chosen)} chosen; "
             "expected one entropy more than actions"
         )
     for step, (options, action) in enumerate(zip(expected, chosen, strict=True)):
-        if options and action not in options:
-            raise InvalidInputError(f"chosen[{step}]: {action!r}; expected one of: {', '.join(options)}")
+        for name, entropy in instance(options, f"expected[{step}]", Mapping).items():  # type: ignore[type-abstract]
+            number(entropy, f"expected[{step}], action {plain_text(name, f'expected[{step}]')!r}")
+        if options:
+            one_of(action, f"chosen[{step}]", options)

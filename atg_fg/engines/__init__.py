@@ -8,7 +8,7 @@ from importlib import import_module
 from typing import Any, Final
 
 from atg_fg.core.belief import IdentityBelief
-from atg_fg.core.checks import brief
+from atg_fg.core.checks import brief, instance
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
@@ -127,10 +127,9 @@ def begin_trial(
         InvalidInputError: The engine does not know of structures that objects share, has no such option, or does not
             take this value; or the prior is not a distribution over the objects of this memory.
     """
-    if not isinstance(memory, RobotMemory):
-        raise InvalidInputError(f"memory: {brief(memory)}; expected a RobotMemory")
-    if not isinstance(parameters, ModelParameters):
-        raise InvalidInputError(f"parameters: {brief(parameters)}; expected ModelParameters")
+    instance(memory, "memory", RobotMemory)
+    instance(parameters, "parameters", ModelParameters)
+    prior = None if prior is None else instance(prior, "prior", IdentityBelief)
     begin: Callable[..., Inference] = (found := engine_for(engine, parameters))
     check_known(found, found.name, options)
     inference = begin(TrialSetup(memory, parameters, prior), **options)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atg_fg.core.assumptions import Assumptions, arcube_assumptions
+from atg_fg.core.checks import MANY, instance, sequence, whole_number
 from atg_fg.core.errors import InvalidInputError, TooLargeError
 from atg_fg.core.look_info import evidence_in
 from atg_fg.core.memory import RobotMemory
@@ -60,8 +61,7 @@ class ComparisonPlan:
 
     def __post_init__(self) -> None:
         for name in ("n_trials", "n_actions", "n_objects", "n_learning_actions"):
-            if getattr(self, name) < 1:
-                raise InvalidInputError(f"{name}: {getattr(self, name)}; expected a whole number of at least 1")
+            whole_number(getattr(self, name), name, 1, MANY)
         if not 0 <= self.n_remembered <= self.n_objects:
             raise InvalidInputError(f"n_remembered: {self.n_remembered}; expected 0 to {self.n_objects}")
 
@@ -101,6 +101,7 @@ class Course(NamedTuple):
         if isinstance(trial, RecordedTrial):
             looks = [look.evidence(assumptions) for look in trial.looks]
             return cls(looks, [assumptions.action_index(action) for action in trial.actions])
+        instance(trial, "trial", TrialRecord)
         looks = [evidence_in(assumptions.alphabet, step.detection, step.truth) for step in trial.steps]
         return cls(looks, trial.actions)
 
@@ -178,13 +179,19 @@ def compare_engines(
         InvalidInputError: An engine has no such option or does not know the model; a trial does not fit the memory; or
             there is none.
     """
-    parameters = parameters or ModelParameters()
-    courses = [each if isinstance(each, Course) else Course.of(each, memory.assumptions) for each in trials]
+    parameters = ModelParameters() if parameters is None else instance(parameters, "parameters", ModelParameters)
+    assumptions = instance(memory, "memory", RobotMemory).assumptions
+    courses = [
+        each if isinstance(each, Course) else Course.of(each, assumptions) for each in sequence(trials, "trials")
+    ]
     if not courses:
         raise InvalidInputError("trials: none; expected at least one")
     reference = REFERENCE_OF_KINDS if parameters.learn_structure else REFERENCE
     engine_for(reference, parameters)
-    tried = {each if isinstance(each, str) else each.name: _Tried.of(each, parameters) for each in engines}
+    tried = {
+        each if isinstance(each, str) else engine_for(each).name: _Tried.of(each, parameters)
+        for each in sequence(engines, "engines")
+    }
     for course in courses:
         for each in tried.values():
             if each.refused is None:

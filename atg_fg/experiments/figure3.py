@@ -7,8 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from atg_fg.core.errors import InvalidInputError
-from atg_fg.core.statistics import mean, standard_error
+from atg_fg.core.statistics import Rate, mean, rates_of, standard_error
 from atg_fg.core.table import Bar, Cell, Table
 from atg_fg.experiments.plans import unusual
 from atg_fg.experiments.result_log import ResultLog, run_logged
@@ -97,21 +96,17 @@ def table_of_points(points: Sequence[Mapping[str, Any]], title: str = "") -> Tab
     """Return the points of Figure 3, a row for each number of actions, a column for each policy.
 
     Raises:
-        InvalidInputError: A point lacks "actions", "policy", "success" or "interval95".
+        InvalidInputError: A point lacks "actions", "policy", "success" or "interval95", or one of them is none.
     """
-    for number, point in enumerate(points):
-        for key in ("actions", "policy", "success", "interval95"):
-            if key not in point:
-                raise InvalidInputError(f"points[{number}]: {dict(point)!r}; expected the key {key!r}")
-    policies = list(dict.fromkeys(str(point["policy"]) for point in points))
-    by_place = {(point["actions"], str(point["policy"])): point for point in points}
+    rates = rates_of(points, "points", ["policy"])
+    policies = list(dict.fromkeys(rate.names[0] for rate in rates))
+    by_place = {(rate.actions, rate.names[0]): rate for rate in rates}
     rows: list[tuple[Cell, ...]] = []
-    for actions in dict.fromkeys(point["actions"] for point in points):
+    for actions in dict.fromkeys(rate.actions for rate in rates):
         found = [by_place.get((actions, policy)) for policy in policies]
-        rows.append((str(actions), *("" if point is None else _point(point) for point in found)))
+        rows.append((str(actions), *("" if rate is None else _bar(rate) for rate in found)))
     return Table(title or "Success by actions", ("actions", *policies), tuple(rows), "success; 95 % intervals")
 
 
-def _point(point: Mapping[str, Any]) -> Bar:
-    low, high = point["interval95"]
-    return Bar(point["success"], f"{100 * point['success']:.1f} % ({100 * low:.1f}–{100 * high:.1f})")
+def _bar(rate: Rate) -> Bar:
+    return Bar(rate.success, f"{100 * rate.success:.1f} % ({100 * rate.low:.1f}–{100 * rate.high:.1f})")

@@ -16,7 +16,7 @@ import numpy as np
 
 from atg_fg.core.assumptions import arcube_assumptions
 from atg_fg.core.belief import IdentityBelief
-from atg_fg.core.checks import whole_number
+from atg_fg.core.checks import MANY, whole_number
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.goals import Goal
 from atg_fg.core.parameters import ModelParameters
@@ -81,9 +81,8 @@ class GoalPlan:
 
     def __post_init__(self) -> None:
         for name in ("n_stations", "n_remembered", "n_objects", "n_actions"):
-            whole_number(getattr(self, name), name, least=1)
-        if self.learning_actions < 0:
-            raise InvalidInputError(f"learning_actions: {self.learning_actions}; expected 0 (complete ATGs) or more")
+            whole_number(getattr(self, name), name, 1, MANY)
+        whole_number(self.learning_actions, "learning_actions", 0, MANY)
         for name, larger in (("n_stations", "n_remembered"), ("n_remembered", "n_objects")):
             if getattr(self, name) > getattr(self, larger):
                 raise InvalidInputError(

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from atg_fg.core.actions import GivenAction
 from atg_fg.core.belief import IdentityBelief
+from atg_fg.core.checks import GREATEST_SEED, instance, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.looks import Look
 from atg_fg.core.memory import RobotMemory
@@ -23,7 +24,7 @@ from atg_fg.core.records import Verdict
 from atg_fg.engines import begin_trial, engine_for, usual_engine
 from atg_fg.experiments.learned_history import learn_history
 from atg_fg.inference.interface import Inference
-from atg_fg.policies import Choice, Policy, make_policy
+from atg_fg.policies import Choice, Policy, as_policy, make_policy
 from atg_fg.worlds.base import detection_of
 
 
@@ -92,11 +93,12 @@ class RecognitionAgent:
         policy: str | Policy = "entropy",
         seed: int = 0,
     ) -> None:
-        self.memory, self.parameters = memory, parameters
-        self.engine = engine or usual_engine(parameters, "bayes-filter")
+        self.memory = instance(memory, "memory", RobotMemory)
+        self.parameters = instance(parameters, "parameters", ModelParameters)
+        self.engine = usual_engine(parameters, "bayes-filter") if engine is None else engine
         engine_for(self.engine, parameters)
-        self.policy: Policy = make_policy(policy) if isinstance(policy, str) else policy
-        self._seeds = np.random.SeedSequence(seed)
+        self.policy: Policy = make_policy(policy) if isinstance(policy, str) else as_policy(policy)
+        self._seeds = np.random.SeedSequence(whole_number(seed, "seed", 0, GREATEST_SEED))
         self.trials: list[Inference] = []
         self._names = memory.names
         self._generators: list[np.random.Generator] = []

@@ -13,6 +13,7 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from atg_fg.core.checks import instance, whole_number
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
@@ -85,13 +86,14 @@ class RecognitionEnv(gymnasium.Env[Summary, np.int64]):
         n_trials: int = 100,
         made_from: Mapping[str, object] | None = None,
     ) -> None:
-        engine_for(engine, parameters)
-        if reward not in _REWARDS:
+        instance(world, "world", gymnasium.Env)
+        instance(memory, "memory", RobotMemory)
+        engine_for(engine, instance(parameters, "parameters", ModelParameters))
+        if not isinstance(reward, str) or reward not in _REWARDS:
             raise unknown_name("reward", reward, _REWARDS)
         for name, number in (("n_actions", n_actions), ("n_trials", n_trials)):
-            if number < 1:
-                raise InvalidInputError(f"{name}: {number}; expected a whole number of at least 1")
-        self._made_from = dict(made_from or {})
+            whole_number(number, name, least=1)
+        self._made_from = dict(instance(made_from or {}, "made_from", Mapping))  # type: ignore[type-abstract]
         if set(self._made_from) != set(memory.names):
             raise InvalidInputError(
                 f"made_from: {', '.join(self._made_from) or 'nothing'}; expected the object of each of "

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
+from atg_fg.core.checks import brief, title_or
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.table import Table
 from atg_fg.experiments.figure3 import table_of_points
@@ -28,10 +29,11 @@ def results_table(results: Any, title: str = "") -> Table:
     from atg_fg.experiments.goal_scores import ServedObject
     from atg_fg.experiments.scores import TestResult
 
+    title = title_or(title, "")
     if isinstance(results, TestResult):
         return table_of_tests([results], title)
     if isinstance(results, Mapping):
-        compared = {str(name): list(tests) for name, tests in results.items()}
+        compared = {str(name): list(tests) if isinstance(tests, Iterable) else [] for name, tests in results.items()}
         if compared and all(tests and _all(tests, TestResult) for tests in compared.values()):
             return _comparison(compared, title)
     elif isinstance(results, Iterable):
@@ -42,7 +44,7 @@ def results_table(results: Any, title: str = "") -> Table:
             if found and _all(found, kind):
                 return table(found, title)
     raise InvalidInputError(
-        f"results: {results!r:.80}; expected test results, a mapping from names to such, points of Figure 3, or goals"
+        f"results: {brief(results)}; expected test results, a mapping from names to such, points of Figure 3, or goals"
     )
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from atg_fg.core.checks import MANY, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.look_info import confidences_in
 from atg_fg.core.recordings import RecordedLook, RecordedTrial, Recording
@@ -15,7 +16,14 @@ from atg_fg.worlds.registry import assumptions_of, make_world_with, sense_of
 
 
 def simulated_recording(
-    name: str, n_objects: int, n_trials: int, n_actions: int, seed: int, objects_seed: int | None = None, **options: Any
+    name: str,
+    n_objects: int,
+    n_trials: int,
+    n_actions: int,
+    /,
+    seed: int,
+    objects_seed: int | None = None,
+    **options: Any,
 ) -> Recording:
     """Return trials in a world, with objects, beginnings and actions drawn at random.
 
@@ -34,6 +42,8 @@ def simulated_recording(
     Raises:
         InvalidInputError: The world cannot be made, or shows no symbols.
     """
+    for place, count in (("n_objects", n_objects), ("n_trials", n_trials), ("n_actions", n_actions)):
+        whole_number(count, place, 1, MANY)
     _, *trial_seeds = np.random.SeedSequence(seed).spawn(1 + n_trials)
     (of_objects,) = np.random.SeedSequence(seed if objects_seed is None else objects_seed).spawn(1)
     drawn = int(np.random.default_rng(of_objects).integers(2**31))

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from atg_fg.core.checks import whole_number
+from atg_fg.core.checks import GREATEST_SEED, MANY, brief, instance, plain_text, sequence, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
@@ -27,11 +27,11 @@ from atg_fg.inference.interface import Inference
 from atg_fg.inference.smoothing import smoothed_patterns
 from atg_fg.learning.duplicates import merge_duplicates
 from atg_fg.learning.structured_memory import StructuredMemory, memory_for
-from atg_fg.policies import Policy, check_entropy_threshold, make_policy
+from atg_fg.policies import Policy, as_policy, check_entropy_threshold, make_policy
 from atg_fg.storage.crop_folder import CropFolder
 from atg_fg.storage.database.trial_log import DatabaseTrialLog, check_not_in_database
 from atg_fg.storage.growing_file import check_not_begun
-from atg_fg.storage.memory_files import goes_to_database, save_memory
+from atg_fg.storage.memory_files import goes_to_database, path_of, save_memory
 from atg_fg.storage.plain_files import make_folder
 from atg_fg.storage.trial_log import TrialLog
 from atg_fg.worlds.base import World
@@ -73,7 +73,10 @@ class TestPlan:
 
     def __post_init__(self) -> None:
         for name in ("n_actions", "n_trials", "n_objects"):
-            whole_number(getattr(self, name), name, least=1)
+            whole_number(getattr(self, name), name, 1, MANY)
+        instance(self.parameters, "parameters", ModelParameters)
+        for name in instance(self.world_options, "world_options", dict):
+            plain_text(name, "name of an option of the world")
         engine_for(self.engine, self.parameters)
         if self.settled is not None:
             check_entropy_threshold(self.settled, "settled")
@@ -87,10 +90,10 @@ class TestPlan:
 def run_test(
     plan: TestPlan,
     seed: int,
-    records: Path | None = None,
+    records: Path | str | None = None,
     resume: bool = False,
     on_trial: Callable[[int, TrialRecord], None] | None = None,
-    memories: Path | None = None,
+    memories: Path | str | None = None,
     policy: Policy | None = None,
     crops: bool = False,
 ) -> TestResult:
@@ -115,10 +118,14 @@ def run_test(
     """
     if policy is not None and records is not None:
         raise InvalidInputError("records: of a policy that the plan does not name; expected none, or its name in it")
+    instance(plan, "plan", TestPlan)
+    records, memories = _path(records, "records"), _path(memories, "memories")
     if crops:
         check_crops(records)
-    objects_seed, *trial_seeds = np.random.SeedSequence(seed).spawn(1 + plan.n_trials)
-    policy = make_policy(plan.policy, plan.settled) if policy is None else policy
+    objects_seed, *trial_seeds = np.random.SeedSequence(whole_number(seed, "seed", 0, GREATEST_SEED)).spawn(
+        1 + plan.n_trials
+    )
+    policy = make_policy(plan.policy, plan.settled) if policy is None else as_policy(policy)
     score = Score()
     with closing(plan.make_world(int(objects_seed.generate_state(1)[0]))) as world:
         empty = RobotMemory(assumptions_of(world, plan.n_objects), sense=sense_of(world))
@@ -151,6 +158,10 @@ def run_test(
         in_folder = not goes_to_database(memories)
         save_memory(memory, make_folder(memories) / f"memory-{seed:04}.json" if in_folder else memories)
     return score.result(seed, merging=plan.merge_duplicates)
+
+
+def _path(given: Path | str | None, place: str) -> Path | None:
+    return None if given is None else path_of(given, place)
 
 
 def check_crops(records: Path | None) -> None:
@@ -208,9 +219,9 @@ def _smoothed(inference: Inference, record: TrialRecord) -> list[int | None] | N
 def run_tests(
     plans: Sequence[tuple[TestPlan, int]],
     jobs: int = 1,
-    records: Path | None = None,
+    records: Path | str | None = None,
     resume: bool = False,
-    memories: Path | None = None,
+    memories: Path | str | None = None,
     executor: str = "process",
     on_result: Callable[[int, TestResult], None] | None = None,
     on_trials: Callable[[int], None] | None = None,
@@ -225,6 +236,10 @@ def run_tests(
     Raises:
         InvalidInputError: As for ``run_test`` and ``run_pieces``.
     """
+    for number, piece in enumerate(sequence(plans, "plans")):
+        if not (isinstance(piece, tuple) and len(piece) == 2 and isinstance(piece[0], TestPlan)):
+            raise InvalidInputError(f"plans[{number}]: {brief(piece)}; expected a TestPlan and a seed")
+    records, memories = _path(records, "records"), _path(memories, "memories")
     if records is not None:
         records = Path(os.path.realpath(records if goes_to_database(records) else make_folder(records)))
         for plan, seed in plans if not resume else ():

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Any
 
+import gymnasium
 import numpy as np
 
 from atg_fg.core.assumptions import Assumptions
+from atg_fg.core.checks import instance, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.look_info import confidences_in, measured_in
 from atg_fg.core.memory import RobotMemory
@@ -15,7 +17,7 @@ from atg_fg.core.patterns import Evidence
 from atg_fg.core.records import TrialRecord, TrialStep, TrialSummary
 from atg_fg.core.sense import Sense, SenseTrial, likelihoods_of, readings_of
 from atg_fg.inference.interface import Inference
-from atg_fg.policies import Policy
+from atg_fg.policies import Policy, as_policy
 from atg_fg.senses.object_readings import look_of, readings_in, without_readings
 from atg_fg.worlds.base import World, detection_of, symbols_of
 from atg_fg.worlds.registry import assumptions_of, sense_of
@@ -106,10 +108,12 @@ def run_trial(
         on_step: Called after every look, with the action already chosen.
         is_checked: Whether ``check_world_fits`` has been asked already, as before the trials of a test.
     """
-    assumptions = inference.memory.assumptions
-    if n_actions < 1:
-        raise InvalidInputError(f"actions: {n_actions}; expected a whole number of at least 1")
+    assumptions = instance(inference, "inference", Inference).memory.assumptions  # type: ignore[type-abstract]
+    whole_number(n_actions, "actions", least=1)
+    instance(rng, "rng", np.random.Generator)
+    policy = as_policy(policy)
     if not is_checked:
+        instance(world, "world", gymnasium.Env)
         check_world_fits(world, assumptions, inference.memory.sense)
     senses = None if inference.memory.sense is None else inference.memory.sense.begin()
     record = TrialRecord(inference.memory.names, assumptions)
@@ -180,8 +184,8 @@ def learn_from(record: TrialRecord | TrialSummary, memory: RobotMemory) -> str |
 
     Nothing is learned, and ``None`` returned, if the object was lost or no pattern was seen whole.
     """
-    trial = TrialSummary.of(record) if isinstance(record, TrialRecord) else record
-    with memory.transaction():
+    trial = TrialSummary.of(record) if isinstance(record, TrialRecord) else instance(record, "record", TrialSummary)
+    with instance(memory, "memory", RobotMemory).transaction():
         name = None
         if can_be_learned(trial):
             name = learn_steps(memory, trial, trial.matched)

@@ -6,10 +6,12 @@ All work on a ``Chain``, so any exact engine can be asked: ``best_explanations(i
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Final
 
 import numpy as np
 
-from atg_fg.core.errors import ImpossibleEvidenceError, InvalidInputError
+from atg_fg.core.checks import MANY, whole_number
+from atg_fg.core.errors import ImpossibleEvidenceError, TooLargeError
 from atg_fg.core.log_math import log_of, log_sum_exp
 from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.inference.chain import Chain, ForwardPass, forward_pass
@@ -35,6 +37,10 @@ class Explanation:
         return float(np.exp(self.log_probability))
 
 
+#: Ways to a look that are compared at once, 8 bytes each.
+_MOST_WAYS: Final = 2**26
+
+
 def best_explanations(chain: Chain, k: int = 1) -> list[Explanation]:
     """Return the k most probable explanations, best first; the first is the MPE. Fewer if fewer are possible.
 
@@ -42,16 +48,21 @@ def best_explanations(chain: Chain, k: int = 1) -> list[Explanation]:
 
     Raises:
         InvalidInputError: k below one.
+        TooLargeError: Too many ways would have to be compared.
         ImpossibleEvidenceError: The evidence has probability zero.
     """
-    if k < 1:
-        raise InvalidInputError(f"k: {k}; expected a whole number of at least 1")
+    whole_number(k, "k", least=1)
     likelihoods = _likelihoods(chain)
     log_evidence = log_sum_exp(_possible(chain).log_joint)
     #: ln p of the r-th best way to each state, shape [H, W, r], and where it came from, flat over (state, rank)
     scores = (chain.log_identity[:, None] + log_of(chain.initial) + log_of(likelihoods[0]))[:, :, None]
     origins: list[IntArray] = []
     for transition, likelihood in zip(chain.transitions, likelihoods[1:], strict=True):
+        if scores.size * transition.shape[2] > _MOST_WAYS:
+            raise TooLargeError(
+                f"k: {k}: would compare {scores.size * transition.shape[2]} ways to a look at once; "
+                f"expected fewer explanations, for at most {_MOST_WAYS} ways"
+            )
         ways = scores[:, :, :, None] + log_of(transition)[:, :, None, :]
         ways = ways.reshape(len(ways), -1, transition.shape[2])
         best = np.argsort(-ways, axis=1, kind="stable")[:, :k]
@@ -83,11 +94,10 @@ def sample_explanations(chain: Chain, n: int, rng: np.random.Generator) -> list[
     """Return n explanations drawn from p(O, X_0:t | z_0:t, a_1:t), by filtering forward and sampling backward.
 
     Raises:
-        InvalidInputError: n below one.
+        InvalidInputError: n below one, or above 100,000.
         ImpossibleEvidenceError: The evidence has probability zero.
     """
-    if n < 1:
-        raise InvalidInputError(f"n: {n}; expected a whole number of at least 1")
+    whole_number(n, "number of samples", 1, MANY)
     past = _possible(chain)
     filtered = past.filtered
     log_identity = past.log_joint - log_sum_exp(past.log_joint)

@@ -17,6 +17,7 @@ import gtsam
 import numpy as np
 
 from atg_fg.core.belief import IdentityBelief
+from atg_fg.core.checks import instance, whole_number
 from atg_fg.core.errors import ImpossibleEvidenceError, InvalidInputError
 from atg_fg.core.log_math import log_sum_exp
 from atg_fg.core.patterns import FloatArray
@@ -41,8 +42,8 @@ class RecognitionGraph:
     """
 
     def __init__(self, chain: Chain, n_unseen: int, number: int = 0, log_scale: float = 0.0) -> None:
-        self.chain = chain
-        self.n_unseen = n_unseen
+        self.chain = instance(chain, "chain", Chain)
+        self.n_unseen = whole_number(n_unseen, "n_unseen")
         self.number = number
         self.log_scale = log_scale
         self.graph: FactorGraph = gtsam.DiscreteFactorGraph()

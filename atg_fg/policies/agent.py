@@ -7,6 +7,7 @@ from typing import Any, ClassVar, Protocol
 import gymnasium
 import numpy as np
 
+from atg_fg.core.checks import brief
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.inference.interface import Inference
 from atg_fg.policies.base import Choice, Policy
@@ -36,7 +37,9 @@ class AgentPolicy:
 
     def __init__(self, agent: Agent, summary: BeliefFeatures | None = None) -> None:
         if not callable(getattr(agent, "predict", None)):
-            raise InvalidInputError(f"agent: {agent!r}; expected an object with predict(observation, deterministic)")
+            raise InvalidInputError(
+                f"agent: {brief(agent)}; expected an object with predict(observation, deterministic)"
+            )
         self.agent, self.summary = agent, summary
 
     def choose(self, inference: Inference, rng: np.random.Generator) -> Choice:
@@ -101,7 +104,7 @@ def as_policy(given: Any, place: str = "policy") -> Policy:
     if isinstance(made, gymnasium.Space):
         return SampledPolicy(made)
     raise InvalidInputError(
-        f"{place}: {made!r}; expected an object with choose(inference, rng), one with "
+        f"{place}: {brief(made)}; expected an object with choose(inference, rng), one with "
         "predict(observation, deterministic), or a gymnasium space"
     )
 

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-import math
+import sys
 from typing import ClassVar
 
 import numpy as np
 
+from atg_fg.core.checks import brief, is_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.inference.interface import Inference
+from atg_fg.policies.agent import as_policy
 from atg_fg.policies.base import Choice, Policy
 
 
@@ -26,7 +28,7 @@ class StoppingPolicy:
     name: ClassVar[str] = "stopping"
 
     def __init__(self, policy: Policy, entropy_threshold: float) -> None:
-        self.policy = policy
+        self.policy = as_policy(policy)
         self.entropy_threshold = check_entropy_threshold(entropy_threshold, "entropy_threshold")
 
     def choose(self, inference: Inference, rng: np.random.Generator) -> Choice:
@@ -42,6 +44,6 @@ def check_entropy_threshold(threshold: float, place: str) -> float:
     Raises:
         InvalidInputError: Not a finite number above 0; the message begins with ``place``.
     """
-    if not 0 < threshold < math.inf:
-        raise InvalidInputError(f"{place}: {threshold!r}; expected a finite entropy above 0 nats")
+    if not (is_number(threshold) and 0 < threshold <= sys.float_info.max):
+        raise InvalidInputError(f"{place}: {brief(threshold)}; expected a finite entropy above 0 nats")
     return threshold

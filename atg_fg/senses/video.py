@@ -25,6 +25,7 @@ Source: TypeAlias = Literal["camera", "video", "images"]
 #: Seconds that a frame may take, the first one too.
 TIMEOUT: Final = 10.0
 _MOST_CAMERAS: Final = 99
+_PNG: Final = b"\x89PNG\r\n\x1a\n"
 _AHEAD = 4  # frames read ahead from a file
 
 
@@ -169,6 +170,20 @@ def check_plain_file(path: str | Path, expected: str) -> None:
         raise InvalidInputError(f"{path}: {what}; expected {expected}")
 
 
+def _check_parts(path: str | Path) -> None:
+    """Raise ``InvalidInputError`` if a PNG says of a part of it that it is longer than the file: OpenCV believes it."""
+    with open(path, "rb") as file:
+        if file.read(len(_PNG)) != _PNG:
+            return
+        end, begin = os.path.getsize(path), len(_PNG)
+        while begin < end:
+            file.seek(begin)
+            length = int.from_bytes(file.read(4), "big")
+            begin += 12 + length  # with length, name and checksum
+        if begin > end:
+            raise InvalidInputError(f"{path}: a part of {length} bytes, past its end; expected a whole image")
+
+
 def read_image(path: str | Path) -> NDArray[np.uint8]:
     """Return an image, RGB, shape [height, width, 3].
 
@@ -177,8 +192,11 @@ def read_image(path: str | Path) -> NDArray[np.uint8]:
     """
     check_plain_file(path, "an image")
     try:
+        _check_parts(path)
         with silenced(2):
             image = cv2.imread(str(path), cv2.IMREAD_COLOR)
+    except OSError as error:
+        raise InvalidInputError(f"{path}: cannot be read: {error.strerror}; expected an image") from error
     except cv2.error as error:
         raise InvalidInputError(
             f"{path}: cannot be read; expected an image of at most {frame_reader.MOST_PIXELS} pixels"

@@ -32,7 +32,7 @@ def load_memory(path: Path | str) -> RobotMemory:
     Raises:
         InvalidInputError: Unreadable, or anything in it is not as it should be; the message names the place.
     """
-    _check_path(path)
+    path_of(path)
     if is_database(path):
         return load_database(path)
     if is_compact(path):
@@ -49,7 +49,7 @@ def save_memory(memory: RobotMemory, path: Path | str) -> None:
     Raises:
         InvalidInputError: The file cannot be written, or arrays cannot hold this memory; what was there is as it was.
     """
-    _check_path(path)
+    path_of(path)
     check_holds(memory, path)
     if goes_to_database(path):
         save_database(memory, path)
@@ -104,7 +104,7 @@ def open_memory(
         BusyMemoryError: Another process was writing all that time.
         InvalidInputError: There is no such database, or anything in it is not as it should be.
     """
-    _check_path(path)
+    path_of(path)
     with translated(path):
         create = assumptions is not None and not read_only
         connection = open_to_read(path) if read_only else open_to_write(path, create=create, wait=wait)
@@ -121,6 +121,13 @@ def open_memory(
             connection.close()
             raise
     return memory
+
+
+def path_of(given: Path | str, place: str = "memory") -> Path:
+    """Return a path, or raise ``InvalidInputError`` for a number, which would be an open file, or anything else."""
+    if not isinstance(given, (str, os.PathLike)):
+        raise InvalidInputError(f"{place}: {brief(given)}; expected the path of a file")
+    return Path(given)
 
 
 def goes_to_database(path: Path | str) -> bool:
@@ -140,12 +147,6 @@ def is_database_without_memory(path: Path | str) -> bool:
         InvalidInputError: It is a database that cannot be read.
     """
     return is_database(path) and not database_holds_memory(path)
-
-
-def _check_path(path: Path | str) -> None:
-    """Raise ``InvalidInputError`` if this is no path; a number would be an open descriptor, such as standard input."""
-    if not isinstance(path, (str, os.PathLike)):
-        raise InvalidInputError(f"memory: {brief(path)}; expected the path of a file")
 
 
 def _is_there(path: Path | str) -> bool:

@@ -302,7 +302,9 @@ def _read_look(value: Any, sure: Any, slots: tuple[str, ...], place: str, spec: 
             raise InvalidInputError(f"{where}: {brief(entry)}; expected a likelihood above 0")
         labels.append(entry if isinstance(entry, str) else None)
         weights.append(given if isinstance(entry, dict) else None)
-    confidences = tuple(None if each is None else number(each, f"{place}: confidences", 0.0, 1.0) for each in stated)
+    sureness = [None if each is None else number(each, f"{place}: confidences", 0.0, 1.0) for each in stated]
+    # As in a table, a confidence without a label says nothing.
+    confidences = tuple(each if label else None for each, label in zip(sureness, labels, strict=False))
     return RecordedLook(tuple(labels), confidences, tuple(weights) if any(weights) else ())
 
 

@@ -10,6 +10,7 @@ from typing import Any, Final
 import numpy as np
 
 from atg_fg.core.assumptions import Assumptions
+from atg_fg.core.checks import MANY, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import MISSING, IntArray, PatternAlphabet
 from atg_fg.worlds.finite_objects import FiniteObject, Mechanism, ObjectFamily
@@ -32,8 +33,7 @@ def boxed_goods(n_objects: int, seed: int, *, own_dynamics: bool = False) -> Obj
         seed: Of all that is drawn.
         own_dynamics: Whether actions lead each object elsewhere, as drawn, rather than all alike.
     """
-    if n_objects < 1:
-        raise InvalidInputError(f"n_objects: {n_objects}; expected a whole number of at least 1")
+    whole_number(n_objects, "n_objects", 1, MANY)
     rng = np.random.default_rng(seed)
     objects = []
     for _ in range(n_objects):

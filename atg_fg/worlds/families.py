@@ -9,7 +9,7 @@ from typing import Any, Final, TypeAlias
 
 import numpy as np
 
-from atg_fg.core.checks import number, whole_number
+from atg_fg.core.checks import MANY, number, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import Pattern, PatternAlphabet
 from atg_fg.worlds.arcube import ACTION_SOURCES, BACK, FACES, FRONT, N_TAGS, ORIENTATIONS, SUCCESSORS, shown_pattern
@@ -188,7 +188,7 @@ def half_and_half(n_objects: int, seed: int, *, n_successors: int = 3, concentra
         n_successors: As for ``random_atgs``.
         concentration: As for ``random_atgs``.
     """
-    whole_number(n_objects, "n_objects", 2)
+    whole_number(n_objects, "n_objects", 2, MANY)
     rng = _generator(seed)
     draw = _random_atg(_CUBE_ALPHABET, len(ORIENTATIONS), n_successors, concentration)
     n_random = n_objects // 2
@@ -211,7 +211,7 @@ def mixed_kinds(
     Raises:
         InvalidInputError: A share that is no probability, or all of them are zero.
     """
-    whole_number(n_objects, "n_objects", 1)
+    whole_number(n_objects, "n_objects", 1, MANY)
     named = {"cubes": cubes, "prisms": prisms, "locks": locks}
     shares = [probability_option(name, share) for name, share in named.items()]
     if not sum(shares) > 0:
@@ -240,7 +240,7 @@ def cubes_with_repeated_tags(n_objects: int, seed: int, *, share: float = 1 / 3)
         seed: Of all that is drawn.
         share: Of the objects, the first ones, rounded to a whole number of them.
     """
-    whole_number(n_objects, "n_objects", 1)
+    whole_number(n_objects, "n_objects", 1, MANY)
     n_repeating = round(probability_option("share", share) * n_objects)
     rng = _generator(seed)
     repeating = _different(n_repeating, partial(_draw_cube, repeating=True), rng)
@@ -279,7 +279,7 @@ def _random_atg(alphabet: PatternAlphabet, n_aspects: int, n_successors: int, co
 
 def _different(n: int, draw: _Draw, rng: np.random.Generator) -> tuple[FiniteObject, ...]:
     """Draw ``n`` objects, no two of which look the same however they are acted on."""
-    whole_number(n, "n_objects", 0)
+    whole_number(n, "n_objects", 0, MANY)
     objects: dict[Any, FiniteObject] = {}
     in_vain = 0
     while len(objects) < n:

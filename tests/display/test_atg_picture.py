@@ -87,7 +87,9 @@ def test_the_same_graph_gives_the_same_picture():
 
 @pytest.mark.parametrize("highlight", [-1, 99])
 def test_an_aspect_that_is_not_there_cannot_be_highlighted(highlight):
-    with pytest.raises(InvalidInputError, match=f"highlight: aspect {highlight}"):
+    with pytest.raises(
+        InvalidInputError, match=f"highlight, a known aspect: {highlight}; expected a whole number from 0 to"
+    ):
         draw_atg(explored(4), highlight=highlight)
 
 

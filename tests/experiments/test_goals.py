@@ -92,7 +92,7 @@ def test_without_learning_in_the_trial_it_works_too():
 @pytest.mark.parametrize(
     ("wrong", "message"),
     [
-        ({"n_stations": 0}, "n_stations: 0; expected a whole number of at least 1"),
+        ({"n_stations": 0}, "n_stations: 0; expected a whole number from 1 to 100000"),
         ({"n_stations": 21}, "n_stations: 21; expected at most n_remembered = 20"),
         ({"n_remembered": 101}, "n_remembered: 101; expected at most n_objects = 100"),
         ({"learning_actions": -1}, "learning_actions: -1"),

@@ -103,7 +103,7 @@ def test_figure_3_has_a_point_for_each_policy_and_number_of_actions():
 
 @pytest.mark.parametrize("sizes", [{"n_actions": 0}, {"n_trials": 0}, {"n_objects": -1}])
 def test_a_plan_of_nothing_is_refused(sizes):
-    with pytest.raises(InvalidInputError, match="expected a whole number of at least 1"):
+    with pytest.raises(InvalidInputError, match="expected a whole number from 1 to 100000"):
         TestPlan(**sizes)
 
 

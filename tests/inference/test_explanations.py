@@ -4,7 +4,7 @@ import gtsam
 import numpy as np
 import pytest
 
-from atg_fg.core.errors import ImpossibleEvidenceError, InvalidInputError
+from atg_fg.core.errors import ImpossibleEvidenceError, InvalidInputError, TooLargeError
 from atg_fg.engines import begin_trial
 from atg_fg.inference.chain import Chain
 from atg_fg.inference.explanations import best_explanations, sample_explanations, surprise
@@ -137,5 +137,16 @@ def test_impossible_evidence_and_bad_numbers_are_refused():
             ask(impossible)
     with pytest.raises(InvalidInputError, match="k: 0"):
         best_explanations(chain, 0)
-    with pytest.raises(InvalidInputError, match="n: 0"):
+    with pytest.raises(InvalidInputError, match="number of samples: 0"):
         sample_explanations(chain, 0, np.random.default_rng(0))
+
+
+def test_more_explanations_than_memory_holds_are_refused_before_it_is_taken():
+    chain = by_hand()
+    with pytest.raises(InvalidInputError, match="number of samples: 2147483647; expected a whole number from 1 to"):
+        sample_explanations(chain, 2**31 - 1, np.random.default_rng(0))
+    wide = np.full((4, 64, 64), 1 / 64)
+    many = Chain(np.full(4, 1 / 4), np.full((4, 64), 1 / 64), (wide,) * 9, (np.ones((4, 64)),) * 10)
+    assert len(best_explanations(many, 100)) == 100
+    with pytest.raises(TooLargeError, match=r"k: 100000000: would compare 4294967296 ways to a look at once"):
+        best_explanations(many, 10**8)

@@ -161,6 +161,14 @@ def test_an_image_that_would_unfold_to_gigabytes_is_refused(tmp_path):
         list(frames)
 
 
+@pytest.mark.parametrize("length", [2**20, 2**30, 2**31 - 1, 2**32 - 1])
+def test_an_image_is_not_believed_that_a_part_of_it_is_longer_than_the_file(tmp_path, length):
+    whole = huge(tmp_path / "a.png").read_bytes()
+    (tmp_path / "a.png").write_bytes(whole.replace(whole[33:41], struct.pack(">I", length) + b"IDAT"))
+    with pytest.raises(InvalidInputError, match=rf"a\.png: a part of {length} bytes, past its end"):
+        read_image(tmp_path / "a.png")
+
+
 def test_image_codecs_do_not_speak_in_the_place_of_the_error(tmp_path, capfd):
     head = b"\x89PNG\r\n\x1a\n" + struct.pack(">I4sIIBBBBB", 13, b"IHDR", 2**31 - 1, 2**31 - 1, 8, 0, 0, 0, 0)
     (tmp_path / "vast.png").write_bytes(head + struct.pack(">I", zlib.crc32(head[12:])))

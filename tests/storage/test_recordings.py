@@ -15,6 +15,7 @@ from atg_fg.storage.recording_csv import CsvReader
 from atg_fg.storage.recording_csv_writing import write_csv
 from atg_fg.storage.recordings import (
     RecordingSpec,
+    check_recording,
     merged_spec,
     read_recording,
     read_spec,
@@ -207,6 +208,17 @@ def test_both_faces_hold_the_same(tmp_path_factory, drawn):
         kept = [[(look.labels, tuple(look.confidences or (None,))) for look in each.looks] for each in again.trials]
         assert kept == [[(look.labels, look.confidences) for look in each.looks] for each in trials]
         assert [each.actions for each in again.trials] == [each.actions for each in trials]
+
+
+def test_a_confidence_without_a_label_says_nothing_in_either_form(tmp_path):
+    (tmp_path / "looks.jsonl").write_text(
+        '{"format": "atg-fg/recording", "version": 1, "slots": ["label"], "actions": ["go"], "labels": ["a"]}\n'
+        '{"trial": "0", "actions": ["go"], "looks": [["a"], [null]], "confidences": [[0.5], [0.83]]}\n'
+    )
+    (tmp_path / "looks.csv").write_text("trial,step,action,label,label:confidence\n0,0,go,a,0.5\n0,1,,,0.83\n")
+    for name in ("looks.jsonl", "looks.csv"):
+        recording = check_recording(tmp_path / name)[0]
+        assert [look.confidences for look in recording.trials[0].looks] in ([(0.5,), (None,)], [(0.5,), ()]), name
 
 
 def test_whole_likelihoods_go_there_and_back(tmp_path):
