@@ -75,15 +75,10 @@ class TablesOnDemand(RecognitionModel):
         return twin
 
     def learn(self, previous: int | None, action: int | None, pattern: int | None) -> Revelation | None:
-        """Extend every hypothesis by what was just seen, at once or when the tables are made.
-
-        Args:
-            previous: Pattern seen one step earlier, ``None`` if that look was not complete.
-            action: Action since then, ``None`` at the first step.
-            pattern: Pattern seen now, ``None`` if this look was not complete.
+        """Extend every hypothesis as ``RecognitionModel.learn`` does: at once, or when the tables are made.
 
         Returns:
-            How belief in the collection nodes is to be divided; ``None`` if no aspect is new, or learning is put off.
+            As there; ``None``, too, if it is put off.
         """
         if self._put_off is None:
             return super().learn(previous, action, pattern)

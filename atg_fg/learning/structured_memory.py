@@ -98,17 +98,8 @@ class StructuredMemory(RobotMemory):
         """Keep a raw trial, and learn from it what all objects share; return the name of the ATG that it is of now.
 
         Where looks err, raw trials of the past may turn out to be of other objects than they were taken for. Their
-        ATGs are then estimated again; what happened is in ``reassignments``.
-
-        Args:
-            name: Name of the ATG that the trial went to.
-            detections: The symbol in each slot at each look, ``None`` where nothing was seen, length t + 1.
-            actions: Index of the action between each two, length t.
-            confidences: How sure the detector was of each symbol at each look; none if it never says.
-            likelihoods: Of the symbols in each slot at each look, where evidence was no symbol; none if it always was.
-                The model in which looks err learns from the whole of them.
-            measured: What was felt of the object as a whole at each look; none if nothing was.
-            taught: Whether someone said of which object the trial is, so that nothing changes hands because of it.
+        ATGs are then estimated again; what happened is in ``reassignments``. Arguments are those of
+        ``RobotMemory.learn_shared``; from likelihoods the model in which looks err learns as a whole.
 
         Raises:
             UnknownNameError: There is no such ATG.

@@ -164,15 +164,7 @@ class CompactMemory(RobotMemory):
         name: str | None = None,
         measured: Sequence[Measured] = (),
     ) -> str:
-        """Learn from a trial and return the name of the ATG it went to.
-
-        Args:
-            patterns: Index of the pattern seen at each time, ``None`` where it was not complete, length t + 1.
-            actions: Index of the action between each two, ``None`` where it is not sure, length t.
-            matched: Name of the ATG to extend, or ``None`` if the object was judged novel.
-            name: Of the ATG of a novel object; the next number if not given.
-            measured: Nothing: objects have no readings here.
-        """
+        """Learn from a trial, as ``RobotMemory.learn`` does but for readings, which objects do not have here."""
         graph = AspectTransitionGraph(name or self._new_name(), self.assumptions) if matched is None else self[matched]
         known = graph.pattern_indices
         graph.learn(patterns, actions)
