@@ -5,7 +5,8 @@ from 1 to N. So a partition of T trials into K objects has the probability
 
     Σ_M p(M) (M)_K / M^T,   (M)_K = M (M − 1) … (M − K + 1)
 
-and a robot that is told of more objects than it ever meets finds out.
+and a robot that is told of more objects than it ever meets finds out. It may also be told of too few: that there is one
+more is 0.05 times as probable, so p(K) / p(K − 1) = 0.05 K (1 − 1/K)^T for K > N.
 """
 
 from __future__ import annotations
@@ -18,7 +19,7 @@ from atg_fg.core.patterns import FloatArray
 
 #: Probability that there are as many objects as the robot is told.
 TOLD: Final = 0.9999
-#: Weight that a further object keeps beside each known one when all M should be known.
+#: How probable one object more than told is, beside no more.
 ONE_TOO_MANY: Final = 0.05
 #: Numbers of objects that are summed over; of more, some stand for all.
 _MAX_NUMBERS: Final = 400
@@ -37,12 +38,16 @@ def log_partition(n_objects: int, n_trials: int, most: int) -> FloatArray:
     width = np.diff(numbers, prepend=0.0)
     prior = (1.0 - TOLD) * width / width.sum()
     prior[-1] += TOLD
-    factors = np.log(np.maximum(numbers[:, None] - np.arange(most), ONE_TOO_MANY))
+    left = numbers[:, None] - np.arange(min(most, n_objects))
+    factors = np.where(left > 0, np.log(np.maximum(left, 1.0)), -np.inf)
     falling = np.concatenate((np.zeros((len(numbers), 1)), np.cumsum(factors, axis=1)), axis=1)
     result: FloatArray = np.logaddexp.reduce(
         np.log(prior)[:, None] + falling - n_trials * np.log(numbers)[:, None], axis=0
     )
-    return result
+    # As many as there are trials is what a partition can have at most, though a robot may be told of 2^53 objects.
+    more = np.arange(n_objects + 1.0, most + 1.0)
+    steps = np.log(ONE_TOO_MANY * more) + n_trials * np.log1p(-1.0 / more)
+    return np.append(result, result[-1] + np.cumsum(steps))
 
 
 def log_new_weights(n_objects: int, n_trials: int, most: int) -> FloatArray:

@@ -19,18 +19,34 @@ def stirling(n, k):
 def test_partitions_of_trials_into_objects_are_a_distribution(n_trials):
     log_p = log_partition(6, n_trials, n_trials)
     total = sum(stirling(n_trials, k) * np.exp(log_p[k]) for k in range(1, n_trials + 1))
-    # One object more than there are has a small weight, so the total is a little above one.
-    assert 1.0 <= total < 1.01
+    assert total == pytest.approx(1.0, abs=1e-12)
 
 
 def test_a_new_object_weighs_as_much_as_there_are_objects_left():
     assert np.exp(log_new_weights(100, 60, 50))[45] == pytest.approx(55, rel=0.1)
 
 
+@pytest.mark.parametrize(("n_trials", "known"), [(20, 5), (30, 6), (48, 7)])
+def test_while_not_all_have_been_met_a_new_one_weighs_as_much_as_there_are_left(n_trials, known):
+    # That there are fewer than told is so improbable that it takes many trials to be believed.
+    assert np.exp(log_new_weights(8, n_trials, 12))[known] == pytest.approx(8 - known, rel=0.1)
+
+
 def test_being_told_of_too_many_objects_is_found_out():
     told = np.exp(log_new_weights(30, 48, 12))[8]
     assert told < 1.0  # all eight objects were met again and again; thirty would have shown more
     assert np.exp(log_new_weights(30, 9, 12))[8] > 10.0
+
+
+def test_one_object_more_than_told_is_less_probable_with_every_trial():
+    # p(9 objects) / p(8 objects), of trials that nine have each been met in and of as many that eight have.
+    few, many = (np.exp(log_new_weights(8, n_trials, 12))[8] for n_trials in (20, 1000))
+    assert few == pytest.approx(0.05 * 9 * (8 / 9) ** 20, rel=1e-9)
+    assert many == pytest.approx(0.05 * 9 * (8 / 9) ** 1000, rel=1e-9)
+
+
+def test_far_more_objects_than_told_are_not_impossible():
+    assert np.isfinite(log_new_weights(8, 500, 500)).all()
 
 
 def test_large_numbers_of_objects_cost_no_more():
