@@ -29,13 +29,11 @@ class BayesFilter(FilterInference):
     name: ClassVar[str] = "bayes-filter"
     exact: ClassVar[bool] = True
 
-    #: Whether loops are compiled; not for those that ask for the model's tables at each look.
-    _compiles: ClassVar[bool] = True
     _compiled: CompiledFilter | None = None
 
     def make_tables(self) -> RecognitionModel:
         """Return the tables in force when the trial begins."""
-        if not (self._compiles and compilation.are_wanted()):
+        if not compilation.are_wanted():
             return super().make_tables()
         return TablesOnDemand(self.memory, self.parameters, self.prior, graphs=list(self.memory))
 
@@ -50,6 +48,11 @@ class BayesFilter(FilterInference):
     @property
     def _belief(self) -> FilterState:
         return super()._belief if self._compiled is None else FilterState(*self._compiled.state())
+
+    @property
+    def _log_identity(self) -> FloatArray:
+        """Ln p(O | z_0:t, a_1:t), shape [H]."""
+        return super()._belief.log_identity if self._compiled is None else self._compiled.log_identity
 
     def identity(self) -> IdentityBelief:
         """Return p(O | z_0:t, a_1:t) (eq. 1 and 2)."""

@@ -67,7 +67,6 @@ class LearnedStructure(BayesFilter):
 
     name: ClassVar[str] = "learned-structure"
     exact: ClassVar[bool] = False
-    _compiles: ClassVar[bool] = False
     knows_structure: ClassVar[bool] = True
 
     def __init__(self, setup: TrialSetup) -> None:
@@ -233,7 +232,7 @@ class LearnedStructure(BayesFilter):
 
     def _log_joints(self) -> list[FloatArray]:
         """Return ln p(O, type, z_0:t | a_1:t) of being plain, then of following each structure, each of shape [H]."""
-        plain = self._log_plain + self._belief.log_identity + self.scaled_log_evidence
+        plain = self._log_plain + self._log_identity + self.scaled_log_evidence
         return [plain, *(each.log_joint for each in self._followed)]
 
     def _type_beliefs(self) -> list[FloatArray]:

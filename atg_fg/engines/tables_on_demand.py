@@ -17,9 +17,10 @@ MAX_CELLS: Final = 5_000_000
 
 
 class TablesOnDemand(RecognitionModel):
-    """A ``RecognitionModel`` whose tables are made when one of them is first asked for.
+    """A ``RecognitionModel`` whose tables are made when one of them is asked for.
 
-    Sizes and prior are there at once. Learning is put off until then.
+    Sizes and prior are there at once. Learning is put off until then: tables are laid aside when there is something to
+    learn, so that of a model that nobody asks again they stay as they are.
 
     Args:
         memory: The robot memory when the trial begins.
@@ -45,6 +46,7 @@ class TablesOnDemand(RecognitionModel):
         self._set_sizes(memory, parameters, prior)
         self._graphs, self._max_cells = graphs, max_cells
         self._put_off: list[tuple[int | None, int | None, int | None]] | None = []
+        self._laid_aside: dict[str, Any] = {}
 
     def __getattr__(self, name: str) -> Any:
         """Make all tables if one of them is asked for."""
@@ -63,7 +65,12 @@ class TablesOnDemand(RecognitionModel):
                 f"{self._max_cells}: ask for identity, expected entropies or smoothed aspects, or another engine"
             )
         put_off, self._put_off = self._put_off, None
-        self._make_tables(list(self.memory) if self._graphs is None else self._graphs)
+        if self._laid_aside:
+            vars(self).update(self._laid_aside)
+        else:
+            there = set(vars(self))
+            self._make_tables(list(self.memory) if self._graphs is None else self._graphs)
+            self._laid_aside = dict.fromkeys(vars(self).keys() - there)  # their names
         for looked in put_off:
             super().learn(*looked)
 
@@ -75,12 +82,13 @@ class TablesOnDemand(RecognitionModel):
         return twin
 
     def learn(self, previous: int | None, action: int | None, pattern: int | None) -> Revelation | None:
-        """Extend every hypothesis as ``RecognitionModel.learn`` does: at once, or when the tables are made.
+        """Put off to extend every hypothesis, as ``RecognitionModel.learn`` does, until tables are asked for.
 
         Returns:
-            As there; ``None``, too, if it is put off.
+            ``None``.
         """
         if self._put_off is None:
-            return super().learn(previous, action, pattern)
+            self._laid_aside = {name: vars(self).pop(name) for name in self._laid_aside}
+            self._put_off = []
         self._put_off.append((previous, action, pattern))
         return None

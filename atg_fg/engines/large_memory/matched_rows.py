@@ -46,13 +46,13 @@ class MatchedRows(CompiledRows):
             float(parameters.transition_concentration),
         )
         super().__init__(assumptions, parameters, TrialArrays(tables, np.zeros((len(prior), width))), prior)
-        #: ln of what all rows weigh; before the first look that is in ``_log_identity``
+        #: ln of what all rows weigh; before the first look that is in ``log_identity``
         self._log_total = 0.0
 
     @property
     def log_weight(self) -> FloatArray:
         """Ln p(row, z_0:t), shape [R]."""
-        weights: FloatArray = self._log_identity + self._log_total
+        weights: FloatArray = self.log_identity + self._log_total
         return weights
 
     @property
@@ -74,7 +74,7 @@ class MatchedRows(CompiledRows):
 
     def rule_out(self) -> None:
         """Let all rows be impossible from here on."""
-        self._log_identity[:], self.identity[:] = -np.inf, 0.0
+        self.log_identity[:], self.identity[:] = -np.inf, 0.0
 
     def absorb(self, other: MatchedRows) -> None:
         """Add the rows of a filter that has gone through the same trial."""
@@ -82,18 +82,18 @@ class MatchedRows(CompiledRows):
         log_total = float(np.logaddexp(self._log_total, other._log_total))
         pairs = []
         for each in (self, other):
-            each._log_identity += each._log_total - log_total
+            each.log_identity += each._log_total - log_total
             more = ((0, 0), (0, width - each._aspects.shape[1]))
             each._aspects = np.pad(each._aspects, more)
             pairs.append(each._tables._replace(pattern=np.pad(each._tables.pattern, more)))
         moved = pairs[1]._replace(begins=pairs[1].begins + len(pairs[0].counted))
         self._tables = kernels.Tables(*(np.concatenate(pair) for pair in zip(pairs[0], moved, strict=True)))
         self._arrays = tuple(self._tables)
-        for name in ("_aspects", "_log_identity", "_shown"):
+        for name in ("_aspects", "log_identity", "_shown"):
             setattr(self, name, np.concatenate((getattr(self, name), getattr(other, name))))
         self._log_total = log_total
         self._shown_pattern = max(self._shown_pattern, other._shown_pattern)
-        self.identity = np.exp(self._log_identity)
+        self.identity = np.exp(self.log_identity)
 
     def next_looks(self, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return Σ_i J and Σ_i Σ_z J ln J for J = p(O = i, z | a), shapes [A, |𝒵|] and [A].

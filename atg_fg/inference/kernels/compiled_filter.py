@@ -43,9 +43,9 @@ class CompiledRows:
         self._arrays = tuple(self._tables)
         self._room = ROOM
         self._n_learned = 0
-        #: p(O), shape [H]
+        #: p(O) and its logarithm, shape [H]
         self.identity = prior.copy()
-        self._log_identity = log_of(prior)
+        self.log_identity = log_of(prior)
         self._shown, self._shown_pattern = np.zeros(len(prior), self._tables.n_known.dtype), -1
         #: what has happened since the last look
         self._action: int = kernels.BEGIN
@@ -55,14 +55,14 @@ class CompiledRows:
         self._move()
         n_known = self._tables.n_known.astype(np.int64)
         is_there = np.arange(1 + n_known.max()) <= n_known[:, None]
-        return self._log_identity.copy(), np.where(is_there, self._aspects[:, : is_there.shape[1]], 0.0)
+        return self.log_identity.copy(), np.where(is_there, self._aspects[:, : is_there.shape[1]], 0.0)
 
     def weigh(self, likelihood: FloatArray) -> float:
         """Condition on what was felt of the object, p(reading | O) above 0, shape [H]; return ln p(reading | z_0:t)."""
-        log_joint = self._log_identity + np.log(likelihood)
+        log_joint = self.log_identity + np.log(likelihood)
         log_probability = log_sum_exp(log_joint)
-        self._log_identity = log_joint - log_probability
-        self.identity = np.exp(self._log_identity)
+        self.log_identity = log_joint - log_probability
+        self.identity = np.exp(self.log_identity)
         return log_probability
 
     def look(self, likelihood: FloatArray, seen: LookedAt) -> float:
@@ -82,7 +82,7 @@ class CompiledRows:
             self._n_learned += 1
             counted = (-1, 0) if before is None or action is None else (before, action)
             learned = (*counted, pattern, self._shown_pattern)
-        belief = (self._aspects, self._log_identity, self.identity)
+        belief = (self._aspects, self.log_identity, self.identity)
         log_probability = kernels.step(
             self._arrays, self._constants, belief, self._action, likelihood, learned, self._shown
         )
