@@ -16,8 +16,8 @@ from atg_fg.worlds.registry import ARCUBE_WORLDS, WORLDS
 from tests.cli.conftest import run as run  # a fixture
 
 SIMULATED = ("rendered", "robonaut", "robonaut-picture-box")
-#: Worlds whose looks are pictures.
-LONG = ("picture-box", "meshes")
+#: Worlds and engines that write what others do not: one slot, a tag twice, a bound. The rest of the grid is for CI.
+QUICK_WORLDS, QUICK_ENGINES = ("ideal", "detector", "repeated-tags"), ("gtsam", "large-memory")
 N_TRIALS = 2
 
 
@@ -29,13 +29,12 @@ def cases():
         for world in WORLDS:
             # The simulator needs its extra, and minutes for what an ideal world shows at once: one preset is enough.
             if world not in SIMULATED:
-                # The worlds differ in what they write, the presets in how it is judged: the rest of the grid is for CI.
-                one_of_many = (world != "ideal" and name != "default") or world in LONG
-                marks = [pytest.mark.slow] if one_of_many else []
+                is_quick = world == "ideal" or (name == "default" and world in QUICK_WORLDS)
+                marks = [] if is_quick else [pytest.mark.slow]
                 yield pytest.param(world, name, quick, id=f"{world}-{name}-{quick}", marks=marks)
         for engine in able:
             if engine != quick:
-                marks = [pytest.mark.slow] if name != "default" else []
+                marks = [] if name == "default" and engine in QUICK_ENGINES else [pytest.mark.slow]
                 yield pytest.param("ideal", name, engine, id=f"ideal-{name}-{engine}", marks=marks)
 
 
