@@ -205,6 +205,7 @@ results-structure: $(READY)  ## Run the experiments on learned structure (about 
 	$(BIN)/atg-fg table1 --preset learned --tests 5 --slip 0.05 --wrong 0.01 --json results/kinds_slipping.json
 	$(BIN)/python benchmarks/kinds_found.py 5
 	$(BIN)/python benchmarks/kinds_found.py 5 0.02 0.005
+	$(BIN)/python benchmarks/told_random_atgs.py 5
 	$(BIN)/atg-fg table1 --preset learned --tests 1 --trials 10 --save-memories out
 	$(BIN)/atg-fg memory structure out/memory-0000.json --plot docs/images/structure.png
 	$(BIN)/atg-fg rescore results/robonaut/*/test-0000.jsonl.gz --preset learned --json results/rescore_learned.json

@@ -24,6 +24,21 @@ def trials_of(objects, seed=0, n_actions=10):
     return [trial_of(each, n_actions, rng) for each in objects]
 
 
+@pytest.mark.parametrize(
+    ("other", "is_possible"),
+    [((0, 2, 1), True), ((1, 2, 1), False), ((0, 1, 1), False), ((0, 2, 0), False)],
+    ids=["another look", "another mode", "another place", "another symbol of one look"],
+)
+def test_what_cannot_be_one_state_is_none(other, is_possible):
+    def table(*shape):
+        return np.zeros(shape, dtype=np.int64)
+
+    columns = (table(2), table(2), table(2), table(2, 1), table(2), table(2, 9), table(2, 9), table(2), table(9, 2))
+    automaton = Automaton(*columns, table(3))
+    one, two = add(automaton, 0, 2, 0), add(automaton, *other)
+    assert unite(automaton, one, two, table(9, 2)) == is_possible
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_trials_of_cubes_merge_into_the_cube(seed):
     merged = merge_states(trials_of(cubes(12, seed), seed), ONE_MODE)
@@ -95,21 +110,6 @@ def test_looks_with_missing_symbols_or_one_twice_are_passed_over():
     trials[3] = RawTrial(((3, 3), *trials[3].detections[1:]), trials[3].actions)
     assert merge_states(trials, ONE_MODE).n_trials == 10
     assert merge_states(trials[2:4], ONE_MODE) is None
-
-
-@pytest.mark.parametrize(
-    ("other", "is_possible"),
-    [((0, 2, 1), True), ((1, 2, 1), False), ((0, 1, 1), False), ((0, 2, 0), False)],
-    ids=["another look", "another mode", "another place", "another symbol of one look"],
-)
-def test_what_cannot_be_one_state_is_none(other, is_possible):
-    def table(*shape):
-        return np.zeros(shape, dtype=np.int64)
-
-    columns = (table(2), table(2), table(2), table(2, 1), table(2), table(2, 9), table(2, 9), table(2), table(9, 2))
-    automaton = Automaton(*columns, table(3))
-    one, two = add(automaton, 0, 2, 0), add(automaton, *other)
-    assert unite(automaton, one, two, table(9, 2)) == is_possible
 
 
 def test_the_order_of_trials_does_not_matter_where_all_agree():
