@@ -14,6 +14,7 @@ from rich.table import Table
 
 from atg_fg.cli import options
 from atg_fg.cli.terminal import say
+from atg_fg.core.checks import MANY
 from atg_fg.display import figures
 from atg_fg.storage import plain_files
 from atg_fg.storage.presets import write_preset
@@ -134,9 +135,10 @@ def webcam(
         typer.Option(writable=True, help="File for the calibration of the webcam, which live takes."),
         plain_files.check_writable,
     ] = Path("webcam.json"),
-    trials: Annotated[int, typer.Option(min=1, help="Cubes put down, each once before any comes again.")] = 3,
+    trials: Annotated[int, typer.Option(min=1, max=MANY, help="Cubes put down, each once before any comes again.")] = 3,
     actions: Annotated[
-        int, typer.Option(min=0, help="Turns of each, at random, to views not shown before where there are such.")
+        int,
+        typer.Option(min=0, max=MANY, help="Turns of each, at random, to views not shown before where there are such."),
     ] = 5,
     seed: Annotated[int, typer.Option(min=0, help="Seed of cubes, turns, noise, and how straight cubes stand.")] = 0,
 ) -> None:

@@ -154,6 +154,6 @@ def _fail(error: Exception) -> int:
     message = str(error)
     if isinstance(error, typer.exceptions.TyperException):
         # The parser's own messages do not all hold the value; the command line does.
-        message = f"{error.format_message()} (given: {' '.join(sys.argv[1:])}; see --help)"
+        message = str(AtgError(f"{error.format_message()} (given: {' '.join(sys.argv[1:])}; see --help)"))
     print(f"atg-fg: {visible(' '.join(message.split()))}", file=sys.stderr)
     return 2

@@ -10,7 +10,7 @@ import typer
 
 from atg_fg.cli import options
 from atg_fg.cli.terminal import say
-from atg_fg.core.checks import whole_number
+from atg_fg.core.checks import MANY, whole_number
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.recordings import Recording, assumptions_for
@@ -96,7 +96,7 @@ def _number_of_trials(trials: str) -> int:
         raise InvalidInputError(
             f"--trials: {trials!r}; expected a number, or a recording together with --memory"
         ) from None
-    return whole_number(number, "--trials", 1)
+    return whole_number(number, "--trials", 1, MANY)
 
 
 def _memory_and_recording(memory: Path, trials: str) -> tuple[RobotMemory, Recording]:

@@ -9,6 +9,7 @@ from typing import Annotated, Any, Final
 import typer
 
 from atg_fg.cli import options
+from atg_fg.core.checks import MANY
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.display import figures
 from atg_fg.experiments.document_tables import tables_of
@@ -64,7 +65,10 @@ def goal(
     trials: Annotated[
         int,
         typer.Option(
-            min=1, help="Runs, each with a memory, cubes and goals of its own.", rich_help_panel=options.TRIALS
+            min=1,
+            max=MANY,
+            help="Runs, each with a memory, cubes and goals of its own.",
+            rich_help_panel=options.TRIALS,
         ),
     ] = 20,
     actions: Annotated[int, typer.Option(help="Actions on each cube, at most.", rich_help_panel=options.TRIALS)] = 40,

@@ -259,6 +259,9 @@ class AspectTransitionGraph:
         twin.revision = self.revision
         return twin
 
+    def __copy__(self) -> AspectTransitionGraph:
+        return self.copy()
+
     def __setstate__(self, state: dict[str, Any]) -> None:
         # It may come from another process, which counts by itself.
         vars(self).update(state, revision=next(_revisions))

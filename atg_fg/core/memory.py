@@ -338,6 +338,9 @@ class RobotMemory(Persistent):
         """Return a memory that can learn without touching this one."""
         return RobotMemory(self.assumptions, (graph.copy() for graph in self), self._merges, self._sense_copied())
 
+    def __copy__(self) -> RobotMemory:
+        return self.copy()
+
     def _sense_copied(self) -> Sense | None:
         return None if self.sense is None else self.sense.copy()
 

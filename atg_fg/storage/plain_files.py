@@ -80,6 +80,7 @@ def read_text_file(path: Path | str, *, packed: bool = False) -> str:
     content = read_bytes_file(path)
     if packed and content.startswith(GZIP):
         content = _unpacked(content, path, "expected a gzipped text file")
+    content = content.removeprefix(codecs.BOM_UTF8)  # as some editors begin a file
     encoding = "utf-16" if packed and content.startswith((codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)) else "utf-8"
     try:
         return content.decode(encoding).replace("\r\n", "\n").replace("\r", "\n")

@@ -165,10 +165,9 @@ class CsvReader:
         actions: Sequence[str] | None = None,
         senses: Sequence[ObjectSense | str] = (),
     ) -> None:
-        lines = text.removeprefix("\ufeff")
-        self._delimiter = _delimiter_of(lines.partition("\n")[0])
+        self._delimiter = _delimiter_of(text.partition("\n")[0])
         # Line ends stay, for one in quotes belongs to a name.
-        self._csv = csv.reader((f"{line}\n" for line in lines.split("\n")), delimiter=self._delimiter, strict=True)
+        self._csv = csv.reader((f"{line}\n" for line in text.split("\n")), delimiter=self._delimiter, strict=True)
         self._rows = self._checked_rows()
         self._labels = None if labels is None else dict.fromkeys(sorted(labels))
         self._actions = None if actions is None else dict.fromkeys(sorted(actions))

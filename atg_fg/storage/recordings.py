@@ -177,7 +177,7 @@ def write_recording(recording: Recording, path: Path | str) -> None:
 
 def _read(path: Path | str, spec: RecordingSpec) -> tuple[Recording, list[Fault]]:
     text = read_text_file(path, packed=True)
-    if text.lstrip("\ufeff \n").startswith("{"):
+    if text.lstrip(" \n").startswith("{"):
         return _of_lines(text, str(path), spec), []
     try:
         reader = CsvReader(text, spec.slots, spec.labels, spec.actions, spec.senses or ())
@@ -212,7 +212,7 @@ def _made(trials: Sequence[RecordedTrial], spec: RecordingSpec, labels: Sequence
 
 
 def _of_lines(text: str, place: str, spec: RecordingSpec) -> Recording:
-    lines = enumerate(text.removeprefix("\ufeff").split("\n"), 1)
+    lines = enumerate(text.split("\n"), 1)
     places = ((f"{place}: line {index}", line) for index, line in lines if line.strip())
     head, first = next(places)
     header = parse_json(first, head)

@@ -19,6 +19,8 @@ _MOST_BYTES: Final = 20_000_000
 _LONGEST_NAME: Final = 200
 _LONGEST_PATH: Final = 900
 _MOST_LINKS: Final = 2000
+#: Lengths, m, and angles beyond it are no robot's, and sums of their squares are no numbers to PyBullet.
+_FARTHEST: Final = 1e4
 _TURNING: Final = ("revolute", "continuous")
 _SIZES: Final = {
     "box": ("size",),
@@ -320,8 +322,8 @@ def _number(element: ElementTree.Element | None, key: str, default: float) -> fl
 
 def _vector(text: str | None, default: str) -> FloatArray:
     values = np.array([float(value) for value in (text or default).split()])
-    if values.shape != (3,) or not np.isfinite(values).all():
-        raise ValueError(f"{text!r} is not three finite numbers")
+    if values.shape != (3,) or not (np.abs(values) <= _FARTHEST).all():  # a NaN is not
+        raise ValueError(f"{text!r} is not three finite numbers of at most {_FARTHEST:g}")
     return values
 
 

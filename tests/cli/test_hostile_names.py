@@ -132,6 +132,11 @@ def test_errors_show_what_was_given_as_it_is(shown, name):
     assert visible(" ".join(name.split())) in shown("memory", "show", f"folder {name}", status=2)
 
 
+@pytest.mark.parametrize("option", ["--actions", "--settled", "--nonsense"])
+def test_an_error_does_not_repeat_all_of_a_long_word(shown, option):
+    assert len(shown("trial", option, "9" * 100_000, status=2)) < 2500
+
+
 def test_there_is_one_way_to_the_terminal():
     sources = [*Path(cli.__file__).parent.glob("*.py"), Path(sim_cli.__file__)]
     for source in sources:

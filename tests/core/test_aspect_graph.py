@@ -1,3 +1,6 @@
+import copy
+from typing import Any
+
 import pytest
 
 from atg_fg.core.aspect_graph import COLLECTION_NODE, AspectTransitionGraph
@@ -157,9 +160,10 @@ def test_networkx_has_no_collection_node_once_all_aspects_are_known() -> None:
     assert view.number_of_edges() == 1
 
 
-def test_a_copy_goes_its_own_way() -> None:
+@pytest.mark.parametrize("copied", [AspectTransitionGraph.copy, copy.copy, copy.deepcopy])
+def test_a_copy_goes_its_own_way(copied: Any) -> None:
     cup = graph(WORLD, "cup", [(0,), (1,)], (0, 0, 1, 1))
-    twin = cup.copy()
+    twin = copied(cup)
     assert twin == cup
     twin.learn([1, 2], [0])
     assert twin != cup

@@ -1,3 +1,7 @@
+import copy
+import pickle
+from typing import Any
+
 import numpy as np
 import pytest
 
@@ -83,9 +87,12 @@ def test_a_graph_taken_out_before_is_not_changed_by_learning() -> None:
     assert before == cup_and_mug()["cup"]
 
 
-def test_a_copy_goes_its_own_way() -> None:
+@pytest.mark.parametrize(
+    "copied", [RobotMemory.copy, copy.copy, copy.deepcopy, lambda it: pickle.loads(pickle.dumps(it))]
+)
+def test_a_copy_goes_its_own_way(copied: Any) -> None:
     memory = cup_and_mug()
-    twin = memory.copy()
+    twin = copied(memory)
     assert twin == memory
     twin["mug"].add_aspect((0,))
     twin.learn([5], [], matched=None)

@@ -35,6 +35,15 @@ def test_saving_and_loading_changes_nothing(memory, tmp_path):
     assert memory_files.load_memory(tmp_path / "memory.json") == memory
 
 
+def test_a_text_may_begin_with_a_mark_of_its_encoding_as_some_editors_write_it(memory, tmp_path):
+    path = tmp_path / "memory.json"
+    path.write_bytes(b"\xef\xbb\xbf" + memory_json.memory_to_json(memory).encode())
+    assert memory_files.load_memory(path) == memory
+    path.write_bytes(b"\xef\xbb\xbfBAYES\n\xff")
+    with pytest.raises(InvalidInputError, match="line 2: byte 0xff, not UTF-8"):
+        plain_files.read_text_file(path)
+
+
 def test_a_failed_write_leaves_the_old_file_and_no_other(memory, tmp_path, monkeypatch):
     path = tmp_path / "memory.json"
     memory_files.save_memory(memory, path)

@@ -98,7 +98,10 @@ def test_a_file_that_is_not_xml_is_refused(tmp_path, content):
     refused(path, "cannot be read as URDF: .*; expected a robot's description")
 
 
-@pytest.mark.parametrize("numbers", ["1 2", "1 2 3 4", "left right up", "0.1, 0.2, 0.3"])
+@pytest.mark.parametrize(
+    "numbers",
+    ["1 2", "1 2 3 4", "left right up", "0.1, 0.2, 0.3", "nan 0 0", "inf 0 0", "0 -1e30 0", "1e308 1e308 1e308"],
+)
 @pytest.mark.parametrize(("element", "attribute"), [("origin", "xyz"), ("origin", "rpy"), ("axis", "xyz")])
 def test_a_vector_that_is_not_three_numbers_is_refused(tmp_path, element, attribute, numbers):
     tree = descriptions.parsed()
