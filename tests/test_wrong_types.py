@@ -55,6 +55,7 @@ def observed(look):
 IDEAL = atg_fg.make_world("ideal")
 RNG = np.random.default_rng(0)
 TINY = atg_fg.TestPlan(engine="bayes-filter", n_trials=1, n_actions=1)
+GOAL = atg_fg.Goal(PAPER.alphabet, (0, None))
 RECORD = TrialRecord.from_looks(PAPER, [(0, 1), (2, 1)], ["left"])
 
 CALLS = {
@@ -119,6 +120,11 @@ CALLS = {
     "one trial compared": lambda wrong: atg_fg.compare_engines(["bayes-filter"], remembered(), [wrong]),
     "goal": lambda wrong: atg_fg.Goal(PAPER.alphabet, wrong),
     "alphabet of a goal": lambda wrong: atg_fg.Goal(wrong, (0, None)),
+    "goal of a policy": atg_fg.GoalPolicy,
+    "planner": lambda wrong: atg_fg.GoalPolicy(GOAL, wrong),
+    "what is unreachable": lambda wrong: atg_fg.GoalPolicy(GOAL, unreachable=wrong),
+    "threshold of a goal": lambda wrong: atg_fg.GoalPolicy(GOAL, entropy_threshold=wrong),
+    "confidence of a goal": lambda wrong: atg_fg.GoalPolicy(GOAL, confidence=wrong),
     "wanted": lambda wrong: atg_fg.Goal.of_slots(PAPER.alphabet, wrong),
     "text of a goal": lambda wrong: atg_fg.Goal.parse(PAPER.alphabet, wrong),
     "prior": lambda wrong: begin_trial(
@@ -189,6 +195,7 @@ RIGHT = {
     "policy of an agent": ARRAYS,
     "options of a world": [brief({"a": None})],
     "threshold": ["1.5"],
+    "threshold of a goal": ["1.5"],
     "confidence": ["-1", "1.5"],
     "image": ["array([[1.5]])"],
     "images": ["{}"],

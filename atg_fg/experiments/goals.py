@@ -28,7 +28,7 @@ from atg_fg.experiments.goal_scores import ServedObject, score, table_of_goals
 from atg_fg.experiments.plans import unusual
 from atg_fg.experiments.trial import run_trial
 from atg_fg.inference.all_different import identity_given_others
-from atg_fg.policies import POLICIES, GoalPolicy, make_policy
+from atg_fg.policies import POLICIES, GoalPolicy, check_entropy_threshold, make_policy
 from atg_fg.policies.goal import ENTROPY_THRESHOLD, PLANNERS, UNREACHABLE
 from atg_fg.storage.checked_json import parse_json, plain_json
 from atg_fg.storage.growing_file import check_not_begun
@@ -88,6 +88,7 @@ class GoalPlan:
                 raise InvalidInputError(
                     f"{name}: {getattr(self, name)}; expected at most {larger} = {getattr(self, larger)}"
                 )
+        check_entropy_threshold(self.settled, "settled")
         engine_for(self.engine, self.parameters)
         for role, name, known in (
             ("planner", self.planner, PLANNERS),

@@ -7,6 +7,7 @@ from typing import ClassVar, Final, TypeAlias
 
 import numpy as np
 
+from atg_fg.core.checks import instance, number
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.goals import Goal
 from atg_fg.inference.belief_components import LEAST_PROBABILITY
@@ -16,6 +17,7 @@ from atg_fg.policies.expected_costs import ExpectedCosts, best_by_expectation, b
 from atg_fg.policies.exploration import exploration_costs_of
 from atg_fg.policies.information_gain import EntropyPolicy
 from atg_fg.policies.shortest_paths import COSTS, action_costs, goal_aspects
+from atg_fg.policies.stopping import check_entropy_threshold
 from atg_fg.policies.value_iteration import action_values
 
 #: What may be done about a goal that no known path leads to.
@@ -102,17 +104,15 @@ class GoalPolicy:
         entropy_threshold: float = ENTROPY_THRESHOLD,
         confidence: float = 0.95,
     ) -> None:
-        if planner not in PLANNERS:
+        if not isinstance(planner, str) or planner not in PLANNERS:
             raise unknown_name("planner", planner, PLANNERS)
-        if unreachable not in UNREACHABLE:
+        if not isinstance(unreachable, str) or unreachable not in UNREACHABLE:
             raise unknown_name("unreachable", unreachable, UNREACHABLE)
-        if not entropy_threshold > 0:
-            raise InvalidInputError(f"entropy_threshold: {entropy_threshold!r}; expected an entropy above 0 nats")
-        if not 0.5 < confidence < 1:
+        if not number(confidence, "confidence", below=1) > 0.5:
             raise InvalidInputError(f"confidence: {confidence!r}; expected a probability from above 0.5 to below 1")
-        self.goal = goal
+        self.goal = instance(goal, "goal", Goal)
         self.unreachable = unreachable
-        self.entropy_threshold = entropy_threshold
+        self.entropy_threshold = check_entropy_threshold(entropy_threshold, "entropy_threshold")
         self.confidence = confidence
         self._planner = PLANNERS[planner]()
         self._recognition = EntropyPolicy()

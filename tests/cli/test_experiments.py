@@ -156,6 +156,7 @@ def test_table1_without_settled_says_nothing_of_it(run):
 
 @pytest.mark.parametrize("command", ["table1", "trial"])
 def test_an_entropy_that_settles_nothing_is_refused(refused, command):
+    assert "settled: inf; expected a finite entropy above 0 nats" in refused("goal", "--settled", "inf")
     assert "--settled: 0.0; expected a finite entropy above 0 nats" in refused(command, "--settled", "0")
 
 
