@@ -15,6 +15,8 @@ TESTS = ["tests/engines/test_agreement.py", "-k", "posterior and (-0] or -1])"]
 #: Of faults in these folders: the compiled filter beside the one in NumPy; kinds of objects beside sums over all cases.
 TESTS_OF = {
     "inference/kernels/": ["tests/inference/kernels/test_compiled_filter.py"],
+    "learning/pose_": ["tests/learning/test_likelihood.py", "-k", "known_are_filtered or clean_trial"],
+    "learning/learner": ["tests/learning/test_learner.py", "-k", "remembered_object"],
     "learning/": [f"tests/learning/test_{name}.py" for name in ("state_merging", "kinds", "plain_evidence")],
 }
 
@@ -139,6 +141,18 @@ FAULTS = [
         "if n_left < 0:",
     ),
     Fault(
+        "merging: states of different modes are one",
+        "learning/merging_kernels.py",
+        "if automaton.mode[one] != automaton.mode[two] or automaton.place[one] != automaton.place[two]:",
+        "if automaton.place[one] != automaton.place[two]:",
+    ),
+    Fault(
+        "merging: two symbols of one look are in one place",
+        "learning/merging_kernels.py",
+        "if automaton.looks[one, word] & automaton.looks[two, word]:",
+        "if word < 0:",
+    ),
+    Fault(
         "merging: nothing folds backward",
         "learning/merging_kernels.py",
         "if not link(automaton, state, back, previous, to_do):",
@@ -185,6 +199,30 @@ FAULTS = [
         "learning/plain_evidence.py",
         "own = of_each[:, rivals.index(owner)] if owner in rivals else fresh",
         "own = fresh",
+    ),
+    Fault(
+        "kinds: trials of an object met again are as those of any",
+        "learning/learner.py",
+        "self._plain.of_kinds(self.noise, met_again=True)",
+        "self._plain.of_kinds(self.noise)",
+    ),
+    Fault(
+        "kinds: an object is of the kind of its last trial",
+        "learning/learner.py",
+        "np.add.at(by_object, self._owner_indices, by_trial)",
+        "by_object[self._owner_indices] = by_trial",
+    ),
+    Fault(
+        "poses: an action that fails has led on as well",
+        "learning/pose_kernels.py",
+        "np.concatenate((weight * (1.0 - slip), weight * slip))",
+        "np.concatenate((weight, weight * slip))",
+    ),
+    Fault(
+        "poses: a look reveals nothing",
+        "learning/pose_kernels.py",
+        "table[register, symbol] += truth[row]",
+        "table[register, symbol] += 0.0",
     ),
 ]
 
