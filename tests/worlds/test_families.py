@@ -256,7 +256,7 @@ class TestCubes:
             mixed_kinds(10, 0, **shares)
 
     def test_one_object_has_no_halves(self):
-        with pytest.raises(InvalidInputError, match="n_objects: 1; expected a whole number of at least 2"):
+        with pytest.raises(InvalidInputError, match="n_objects: 1; expected a whole number from 2 to 100000"):
             half_and_half(1, 0)
 
     @pytest.mark.parametrize(("share", "n_repeating"), [(0.0, 0), (1 / 3, 4), (1.0, 12)])
