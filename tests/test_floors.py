@@ -12,6 +12,17 @@ LINT = "import sys; from importlinter.cli import lint_imports; sys.exit(lint_imp
 UPWARD = "from atg_fg.storage import presets"
 
 
+#: What lies on the top level, and nothing else.
+FOLDERS = {".ci", "atg_fg", "benchmarks", "docs", "notebooks", "results", "sim", "tests"}
+
+
+def test_the_top_level_holds_no_folder_that_a_run_has_left():
+    if not (ROOT / ".git").exists():
+        pytest.skip("not a checkout")
+    tracked = subprocess.run(["git", "ls-files"], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+    assert {line.partition("/")[0] for line in tracked.splitlines() if "/" in line} == FOLDERS
+
+
 @pytest.fixture
 def tree(tmp_path):
     for name in ("atg_fg", "sim", "benchmarks"):
