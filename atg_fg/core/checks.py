@@ -117,10 +117,16 @@ def distinct_names(value: Any, place: str) -> tuple[str, ...]:
 
 def sequence(value: Any, place: str) -> Sequence[Any]:
     """Return ``value``, or raise ``InvalidInputError`` unless it has a length and an order, and is no text."""
-    if isinstance(value, (str, bytes, Mapping, Set)) or not (hasattr(value, "__len__") and hasattr(value, "__iter__")):
+    if not is_sequence(value):
         raise InvalidInputError(f"{place}: {brief(value)}; expected a sequence")
     found: Sequence[Any] = value
     return found
+
+
+def is_sequence(value: Any) -> bool:
+    """Return whether a value has a length and an order, and is no text."""
+    has_order = not isinstance(value, (str, bytes, Mapping, Set))
+    return has_order and hasattr(value, "__len__") and hasattr(value, "__iter__")
 
 
 def plain_text(value: Any, place: str) -> str:

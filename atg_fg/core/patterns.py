@@ -16,7 +16,7 @@ from typing import Any, Final, TypeAlias, TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from atg_fg.core.checks import brief, distinct_names, listed, plain_text, sequence, whole_number
+from atg_fg.core.checks import brief, distinct_names, is_sequence, listed, plain_text, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.slot_checks import check_confidences, check_slots
 
@@ -212,7 +212,7 @@ class PatternAlphabet:
 
     def check_detection(self, detection: Sequence[int | str | None], place: str = "detection") -> Detection:
         """Return the numbers of the symbols of ``detection``, or raise ``InvalidInputError`` naming ``place``."""
-        if len(sequence(detection, place)) != len(self.slots):
+        if not is_sequence(detection) or len(detection) != len(self.slots):
             raise InvalidInputError(
                 f"{place}: {brief(detection)}; expected one entry for each of {len(self.slots)} slots: "
                 f"{listed(self.slots)}"

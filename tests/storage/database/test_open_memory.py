@@ -245,7 +245,9 @@ def test_other_assumptions_are_refused(path):
 
 def test_what_sqlite_cannot_hold_is_refused_and_nothing_is_written(path):
     memory = plain(1)
-    memory.add(AspectTransitionGraph("half a character: \ud800", memory.assumptions))
+    graph = AspectTransitionGraph("half a character", memory.assumptions)
+    graph.name += ": \ud800"
+    memory.add(graph)
     with pytest.raises(InvalidInputError, match="cannot be held in a database"):
         memory_files.save_memory(memory, path)
     with pytest.raises(InvalidInputError, match="holds no memory"):
