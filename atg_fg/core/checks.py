@@ -19,7 +19,7 @@ MANY: Final = 100_000
 GREATEST_SEED: Final = 2**128 - 1
 #: Names that an error message tells.
 _LISTED: Final = 24
-Kind = TypeVar("Kind")
+_Value = TypeVar("_Value")
 
 
 def whole_number(value: Any, place: str, least: int = 0, most: int | None = None) -> int:
@@ -147,7 +147,7 @@ def listed(names: Iterable[str]) -> str:
     return ", ".join(name if len(name) <= 60 else f"{name[:57]}..." for name in known[:_LISTED]) + more
 
 
-def instance(value: Any, place: str, kind: type[Kind]) -> Kind:
+def instance(value: _Value, place: str, kind: type) -> _Value:
     """Return ``value``, or raise ``InvalidInputError`` unless it is of this class."""
     if not isinstance(value, kind):
         raise InvalidInputError(f"{place}: {brief(value)}; expected {kind.__name__}")

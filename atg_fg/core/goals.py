@@ -39,7 +39,7 @@ class Goal:
     @classmethod
     def of_slots(cls, alphabet: PatternAlphabet, wanted: Mapping[str, int]) -> Goal:
         """Return the goal with the symbols ``wanted`` by the names of their slots, such as ``{"front": 7}``."""
-        for slot in instance(wanted, "wanted", Mapping):  # type: ignore[type-abstract]
+        for slot in instance(wanted, "wanted", Mapping):
             if slot not in alphabet.slots:
                 raise unknown_name("slot of a goal", slot, alphabet.slots)
         return cls(alphabet, tuple(wanted.get(slot) for slot in alphabet.slots))

@@ -111,7 +111,7 @@ def rates_of(points: Any, place: str, keys: Sequence[str]) -> list[Rate]:
 
 def _rate(point: Any, place: str, keys: Sequence[str]) -> Rate:
     for key in (*keys, "actions", "success", "interval95"):
-        if key not in checks.instance(point, place, Mapping):  # type: ignore[type-abstract]
+        if key not in checks.instance(point, place, Mapping):
             raise InvalidInputError(f"{place}: {checks.brief(dict(point))}; expected the key {key!r}")
     ends = f"{place}, key 'interval95'"
     if len(checks.sequence(point["interval95"], ends)) != 2:

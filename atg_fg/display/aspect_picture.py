@@ -54,7 +54,7 @@ class Look:
 
 def check_images(images: Any) -> None:
     """Raise ``InvalidInputError`` unless these are images of symbols that can be drawn, or none."""
-    for symbol, image in instance({} if images is None else images, "symbol images", Mapping).items():  # type: ignore[type-abstract]
+    for symbol, image in instance({} if images is None else images, "symbol images", Mapping).items():
         pixels = floats(image, f"image of symbol {brief(symbol)}", "grey or RGB pixels")
         if pixels.ndim not in (2, 3) or 0 in pixels.shape or pixels.shape[2:] not in ((), (3,)):
             raise InvalidInputError(

@@ -48,8 +48,8 @@ def plot_comparison(records: Mapping[str, Compared], *, title: str | None = None
         MissingDependencyError: matplotlib is not installed.
     """
     ran = {}
-    for name, record in instance(records, "comparison plot", Mapping).items():  # type: ignore[type-abstract]
-        instance(record, plain_text(name, "comparison plot"), Compared)  # type: ignore[type-abstract]
+    for name, record in instance(records, "comparison plot", Mapping).items():
+        instance(record, plain_text(name, "comparison plot"), Compared)
         if record.refused is None and len(_numbers(record.seconds, name)):
             ran[name] = record
             _numbers(record.total_variation, name)

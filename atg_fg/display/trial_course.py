@@ -52,7 +52,7 @@ def course_of(trial: TrialRecord | Inference) -> TrialCourse:
     Raises:
         InvalidInputError: There was no look yet, or the memory has learned since the engine's trial began.
     """
-    course = _of_record(trial) if isinstance(trial, TrialRecord) else _of_inference(instance(trial, "trial", Inference))  # type: ignore[type-abstract]
+    course = _of_record(trial) if isinstance(trial, TrialRecord) else _of_inference(instance(trial, "trial", Inference))
     if not course.beliefs:
         raise InvalidInputError("trial: nothing seen yet; expected a first look")
     return course

@@ -181,7 +181,7 @@ def _check_entropies(
             "expected one entropy more than actions"
         )
     for step, (options, action) in enumerate(zip(expected, chosen, strict=True)):
-        for name, entropy in instance(options, f"expected[{step}]", Mapping).items():  # type: ignore[type-abstract]
+        for name, entropy in instance(options, f"expected[{step}]", Mapping).items():
             number(entropy, f"expected[{step}], action {plain_text(name, f'expected[{step}]')!r}")
         if options:
             one_of(action, f"chosen[{step}]", options)

@@ -93,7 +93,7 @@ class RecognitionEnv(gymnasium.Env[Summary, np.int64]):
             raise unknown_name("reward", reward, _REWARDS)
         for name, number in (("n_actions", n_actions), ("n_trials", n_trials)):
             whole_number(number, name, least=1)
-        self._made_from = dict(instance(made_from or {}, "made_from", Mapping))  # type: ignore[type-abstract]
+        self._made_from = dict(instance(made_from or {}, "made_from", Mapping))
         if set(self._made_from) != set(memory.names):
             raise InvalidInputError(
                 f"made_from: {', '.join(self._made_from) or 'nothing'}; expected the object of each of "

@@ -108,7 +108,7 @@ def run_trial(
         on_step: Called after every look, with the action already chosen.
         is_checked: Whether ``check_world_fits`` has been asked already, as before the trials of a test.
     """
-    assumptions = instance(inference, "inference", Inference).memory.assumptions  # type: ignore[type-abstract]
+    assumptions = instance(inference, "inference", Inference).memory.assumptions
     whole_number(n_actions, "actions", least=1)
     instance(rng, "rng", np.random.Generator)
     policy = as_policy(policy)

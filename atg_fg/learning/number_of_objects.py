@@ -44,7 +44,6 @@ def log_partition(n_objects: int, n_trials: int, most: int) -> FloatArray:
     result: FloatArray = np.logaddexp.reduce(
         np.log(prior)[:, None] + falling - n_trials * np.log(numbers)[:, None], axis=0
     )
-    # As many as there are trials is what a partition can have at most, though a robot may be told of 2^53 objects.
     more = np.arange(n_objects + 1.0, most + 1.0)
     steps = np.log(ONE_TOO_MANY * more) + n_trials * np.log1p(-1.0 / more)
     return np.append(result, result[-1] + np.cumsum(steps))

@@ -116,8 +116,9 @@ class PoseFilter:
         self._shown = symbol_probabilities(contents, rates.repeat)
         n_slots = len(alphabet.slots)
         # Loops are compiled anew for arrays that are read-only: these are copies.
-        in_view = np.array(poses.registers[:, :n_slots], order="C")
-        self._structure = (np.array(poses.successors), in_view, poses.possible(n_slots), len(poses.first))
+        self._successors = np.array(poses.successors)
+        self._registers_in_view = np.array(poses.registers[:, :n_slots], order="C")
+        self._possible = poses.possible(n_slots)
         self.log_evidence = np.zeros(n_owners)
 
     def copy(self) -> PoseFilter:
@@ -147,7 +148,7 @@ class PoseFilter:
 
     def act_apart(self, actions: IntArray) -> None:
         """Take in an action of each owner, shape [H]."""
-        self.rows = Rows(*self._kernels.act(tuple(self.rows), self._structure[0], actions, self._rates.slip))
+        self.rows = Rows(*self._kernels.act(tuple(self.rows), self._successors, actions, self._rates.slip))
 
     def observe_pattern(self, symbols: IntArray) -> None:
         """Take in looks that showed every slot, shape [J], or [H, J] for a look of each owner."""
@@ -161,7 +162,7 @@ class PoseFilter:
         rows, (self._contents, self._shown) = self._kernels.follow(
             tuple(self.rows),
             (self._contents, self._shown),
-            self._structure,
+            (self._successors, self._registers_in_view, self._possible, len(self._poses.first)),
             actions,
             symbols,
             (rates.slip, rates.wrong, rates.wrong / len(self._alphabet), rates.repeat),
@@ -176,7 +177,7 @@ class PoseFilter:
         likelihood = np.broadcast_to(likelihood, (len(self.log_evidence), len(symbols)))
         registers, shown = self._in_view(rows), self._shown_in_view(rows)
         joint = pattern_products(shown, symbols) / distinctness(shown, symbols)[:, None]
-        joint *= self._structure[2][rows.pose, None] * likelihood[rows.owner]
+        joint *= self._possible[rows.pose, None] * likelihood[rows.owner]
         probability = joint.sum(axis=1)
         kept, truth = self._condition(probability, likelihood.sum(axis=1))
         right = np.flatnonzero(truth > SAME)
@@ -249,7 +250,7 @@ class PoseFilter:
 
     def _in_view(self, rows: Rows) -> IntArray:
         """Return the register in each of the J slots, shape [R, J]."""
-        in_view: IntArray = self._structure[1][rows.pose]
+        in_view: IntArray = self._registers_in_view[rows.pose]
         return in_view
 
     def _shown_in_view(self, rows: Rows) -> list[FloatArray]:
@@ -319,7 +320,7 @@ class PoseFilter:
         """Return the weighted sum of what rows show, for each owner, shape [I, |𝒵|]."""
         shown = self._shown_in_view(rows)
         symbols = self._alphabet.symbols
-        shown[0] = shown[0] * (weights * self._structure[2][rows.pose] / distinctness(shown, symbols))[:, None]
+        shown[0] = shown[0] * (weights * self._possible[rows.pose] / distinctness(shown, symbols))[:, None]
         combined = shown[0]
         for probabilities in shown[1:]:
             combined = (combined[:, :, None] * probabilities[:, None, :]).reshape(len(combined), -1)

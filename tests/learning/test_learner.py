@@ -1,11 +1,10 @@
 import json
-from dataclasses import astuple
+from dataclasses import astuple, replace
 from fractions import Fraction
 
 import numpy as np
 import pytest
 
-from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.learning.kinds import choose_kinds
 from atg_fg.learning.learner import N_CHAINS, N_DRAWS, StructureLearner
@@ -17,6 +16,7 @@ from atg_fg.learning.register_search import n_scored
 from atg_fg.storage.structure_json import read_learner, write_learner
 from atg_fg.worlds.families import hexagonal_prisms
 from tests.learning.oracle import Structure
+from tests.learning.plain_paths import followed
 from tests.learning.worlds import (
     ARCUBES,
     CUBE,
@@ -32,7 +32,6 @@ from tests.learning.worlds import (
     uncertain_object,
     uncertain_trial,
 )
-from tests.oracle import Atg, Oracle
 
 
 def learned(objects, order, seed=0, n_actions=10, assumptions=ARCUBES, **noise):
@@ -240,28 +239,8 @@ def test_objects_whose_actions_are_uncertain_are_a_kind_of_their_own(unsure):
 
 def plain_atg(before, trial, noise):
     """p(trial | the plain ATG that the trials before it made), by every path in exact fractions."""
-    alphabet = RING_WORLD.alphabet
-    graph = AspectTransitionGraph("it", RING_WORLD)
-    for earlier in before:
-        graph.learn([alphabet.index(look) for look in earlier.detections], earlier.actions)
-    known = [alphabet.patterns[pattern] for pattern in graph.pattern_indices]
-    counts = {(known[x], action, known[y]): n for (x, action, y), n in graph.counts.items()}
-    alpha, delta = (Fraction(str(each)) for each in noise)
-    sum_over_paths = Oracle(
-        n_objects=2,
-        n_aspects=RING_WORLD.n_aspects,
-        n_actions=2,
-        patterns=alphabet.patterns,
-        graphs=[Atg(known, counts)] if before else [],
-        alpha=alpha,
-        delta=delta,
-        learn_in_trial=True,
-    )
-    for time, look in enumerate(trial.detections):
-        if time:
-            sum_over_paths.act(trial.actions[time - 1])
-        sum_over_paths.observe({z: Fraction(z == look) for z in sum_over_paths.Z}, look)
-    weights = [weight for (hypothesis, _), weight in sum_over_paths.weights.items() if hypothesis == 0]
+    oracle = followed(replace(RING_WORLD, n_objects=2), before, trial, noise)
+    weights = [weight for (hypothesis, _), weight in oracle.weights.items() if hypothesis == 0]
     return sum(weights) * (2 if before else 1)  # without an ATG hypothesis 0 is of all objects
 
 

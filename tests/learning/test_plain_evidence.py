@@ -2,12 +2,10 @@
 
 import itertools
 import math
-from fractions import Fraction
 
 import numpy as np
 import pytest
 
-from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
@@ -15,8 +13,8 @@ from atg_fg.core.patterns import Evidence, PatternAlphabet
 from atg_fg.engines import begin_trial
 from atg_fg.learning.plain_evidence import SURE, UNCERTAIN, USUAL, PlainEvidence
 from atg_fg.learning.raw_trials import RawTrial
+from tests.learning.plain_paths import followed
 from tests.learning.worlds import ARCUBES, cubes, trial_of, uncertain_object, uncertain_trial
-from tests.oracle import Atg, Oracle
 
 SMALL = Assumptions(3, 3, ("turn", "tip"), PatternAlphabet(("front",), 4))
 
@@ -27,25 +25,7 @@ def small_trial(symbols, actions):
 
 def exactly(trial, before, noise):
     """ln p(trial | the object of ``before``), ln p(trial | another), ln p(trial), by every path in exact fractions."""
-    graph = AspectTransitionGraph("it", SMALL)
-    graph.learn([look[0] for look in before.detections], before.actions)
-    known = list(graph.aspects)
-    counts = {(known[x], action, known[y]): n for (x, action, y), n in graph.counts.items()}
-    alpha, delta = (Fraction(str(each)) for each in noise)
-    oracle = Oracle(
-        n_objects=3,
-        n_aspects=3,
-        n_actions=2,
-        patterns=SMALL.alphabet.patterns,
-        graphs=[Atg(known, counts)],
-        alpha=alpha,
-        delta=delta,
-        learn_in_trial=True,
-    )
-    for time, look in enumerate(trial.detections):
-        if time:
-            oracle.act(trial.actions[time - 1])
-        oracle.observe({z: Fraction(z == look) for z in oracle.Z}, look)
+    oracle = followed(SMALL, [before], trial, noise)
     weight = [sum(w for (i, _), w in oracle.weights.items() if i == number) for number in (0, 1)]
     return math.log(weight[0] * 3), math.log(weight[1] * 3 / 2), math.log(sum(weight))
 

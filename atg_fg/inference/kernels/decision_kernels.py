@@ -26,8 +26,8 @@ _MANTISSA: Final = 52
 
 _LN_2: Final = float(np.log(2.0))
 
-#: What an index is made of that is never negative: Numba asks of any other whether it counts from the end, and a
-#: decision takes a third longer.
+#: What an index is made of that is never negative: Numba asks of any other whether it counts from the end, which costs
+#: time where little else is done.
 _place: Final = np.uint64
 
 
