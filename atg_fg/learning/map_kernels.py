@@ -10,6 +10,14 @@ from atg_fg.learning.kernels import TrialArrays, copy_into, draw_by_logarithm, s
 
 #: Maps whose evidence a chain has at hand: a later one takes the place of an earlier one.
 _N_KNOWN = 4093
+#: Entries of the table of histories: it begins anew when it is full.
+_N_ENTRIES = 1 << 17
+
+#: What a register has shown in a trial so far, each history once, the empty one first: which of the different looks
+#: each one was [N, T, J], these looks [L, V], the history that each look makes of each, 0 if not known yet [H, L],
+#: prior · Π likelihoods [H, V], ln of its sum [H], and how many are known [1]. Maps differ in which registers are
+#: where, so that few histories come again and again.
+Histories = tuple[IntArray, FloatArray, IntArray, FloatArray, FloatArray, IntArray]
 
 
 @compiled
@@ -17,32 +25,80 @@ def map_log_evidence(
     trials: TrialArrays, plain: FloatArray, sources: IntArray, n_slots: int, prior: FloatArray
 ) -> float:
     """Return Σ ln (p(trial | a fresh object that begins in pose 0) + p(trial | plain)) of register maps [A, P]."""
-    n_registers = sources.shape[1]
-    place, moved = np.empty(n_registers, np.int64), np.empty(n_registers, np.int64)
-    local, is_seen = np.empty((n_registers, len(prior))), np.empty(n_registers, np.bool_)
-    total = 0.0
-    for trial in range(len(trials.lengths)):
-        for register in range(n_registers):
-            place[register] = register
-            is_seen[register] = False
-        for time in range(trials.lengths[trial]):
+    return evidence_of(
+        sources.astype(np.uint32),
+        trials.actions.astype(np.uint32),
+        trials.lengths,
+        plain,
+        histories_of(trials.looks, n_slots, prior),
+    )
+
+
+@compiled_within
+def histories_of(looks: FloatArray, n_slots: int, prior: FloatArray) -> Histories:
+    """Return histories of which none is known but the empty one."""
+    n_trials, n_looks, n_symbols = len(looks), looks.shape[1], len(prior)
+    number = np.empty((n_trials, n_looks, n_slots), np.uint32)
+    rows, n_rows = np.empty((number.size, n_symbols)), 0
+    for trial in range(n_trials):
+        for time in range(n_looks):
             for slot in range(n_slots):
-                register = place[slot]
-                if not is_seen[register]:
-                    is_seen[register] = True
-                    for symbol in range(len(prior)):
-                        local[register, symbol] = prior[symbol]
-                for symbol in range(len(prior)):
-                    local[register, symbol] *= trials.looks[trial, time, slot, symbol]
-            if time + 1 < trials.lengths[trial]:
+                row, symbol = 0, 0
+                while row < n_rows and symbol < n_symbols:
+                    if rows[row, symbol] == looks[trial, time, slot, symbol]:
+                        symbol += 1
+                    else:
+                        row, symbol = row + 1, 0
+                if row == n_rows:
+                    for symbol in range(n_symbols):
+                        rows[row, symbol] = looks[trial, time, slot, symbol]
+                    n_rows += 1
+                number[trial, time, slot] = row
+    capacity = 2 * n_looks * n_slots + _N_ENTRIES // n_rows
+    longer, product = np.empty((capacity, n_rows), np.uint32), np.empty((capacity, n_symbols))
+    log_evidence, n_known = np.zeros(capacity), np.ones(1, np.uint32)
+    longer[0] = 0
+    product[0] = prior
+    return number, rows, longer, product, log_evidence, n_known
+
+
+@compiled_within
+def evidence_of(
+    sources: IntArray, actions: IntArray, lengths: IntArray, plain: FloatArray, histories: Histories
+) -> float:
+    """Return what ``map_log_evidence`` does, and add what registers showed to the histories that are known."""
+    number, rows, longer, product, log_evidence, n_known = histories
+    n_registers, n_slots = sources.shape[1], number.shape[2]
+    places, history = np.empty((2, n_registers), np.uint32), np.empty(n_registers, np.uint32)
+    total = 0.0
+    for trial in range(len(lengths)):
+        if n_known[0] + number[trial].size > len(longer):
+            n_known[0], longer[0] = 1, 0
+        for register in range(n_registers):
+            places[0, register], history[register] = register, 0
+        for time in range(lengths[trial]):
+            if time > 0:
+                action = actions[trial, time - 1]
                 for register in range(n_registers):
-                    moved[register] = place[sources[trials.actions[trial, time], register]]
-                for register in range(n_registers):
-                    place[register] = moved[register]
+                    places[time % 2, register] = places[1 - time % 2, sources[action, register]]
+            for slot in range(n_slots):
+                register, row = places[time % 2, slot], number[trial, time, slot]
+                before = history[register]
+                after = longer[before, row]
+                if after == 0:
+                    after = n_known[0]
+                    n_known[0] += 1
+                    longer[before, row] = after
+                    evidence = 0.0
+                    for symbol in range(rows.shape[1]):
+                        product[after, symbol] = product[before, symbol] * rows[row, symbol]
+                        evidence += product[after, symbol]
+                    log_evidence[after] = np.log(max(evidence, 1e-300))
+                    longer[after] = 0
+                history[register] = after
         evidence = 0.0
         for register in range(n_registers):
-            if is_seen[register]:
-                evidence += np.log(max(local[register].sum(), 1e-300))
+            evidence += log_evidence[history[register]]
         total += np.logaddexp(evidence, plain[trial])
     return total
 
@@ -76,46 +132,48 @@ def anneal_maps(
         rng: Draws.
     """
     n_actions, n_registers = sources.shape
-    best, kept = -np.inf, sources.copy()
+    # Indices without a sign: nobody asks each of them whether it counts from the end.
+    now, actions = sources.astype(np.uint32), trials.actions.astype(np.uint32)
+    histories = histories_of(trials.looks, n_slots, prior)
+    best, kept = -np.inf, now.copy()
     n_options = 2 * n_registers if copies else n_registers
     scores = np.empty(n_options)
-    scored, known = np.empty(_N_KNOWN), np.full((_N_KNOWN, n_actions, n_registers), -1)
+    scored, known = np.empty(_N_KNOWN), np.full((_N_KNOWN, n_actions, n_registers), np.uint16(65535))
     for beta in coldness:
         for action in range(n_actions):
             for register in shuffled(n_registers, rng):
-                mine = sources[action, register]
+                mine = now[action, register]
                 for option in range(n_options):
                     other = option % n_registers
-                    theirs = sources[action, other]
+                    theirs = now[action, other]
+                    now[action, register] = theirs if option < n_registers else other
                     if option < n_registers:
-                        sources[action, register], sources[action, other] = theirs, mine
-                    else:
-                        sources[action, register] = other
+                        now[action, other] = mine
                     # Once a chain is cold, most maps that it looks at are those that it looked at before.
-                    key, is_known = 0, True
+                    key = np.uint32(0)
                     for row in range(n_actions):
                         for column in range(n_registers):
-                            key = key * 31 + sources[row, column]
-                    number = key % len(scored)
+                            key = np.uint32(key * np.uint32(31) + now[row, column])
+                    number, is_known = key % np.uint32(_N_KNOWN), True
                     for row in range(n_actions):
                         for column in range(n_registers):
-                            is_known = is_known and known[number, row, column] == sources[row, column]
+                            is_known = is_known and known[number, row, column] == now[row, column]
                     if not is_known:
-                        known[number] = sources
-                        scored[number] = map_log_evidence(trials, plain, sources, n_slots, prior)
+                        copy_into(known[number], now)
+                        scored[number] = evidence_of(now, actions, trials.lengths, plain, histories)
                     scores[option] = scored[number]
                     if copies:
-                        scores[option] -= copy_cost * count_losses(sources)
+                        scores[option] -= copy_cost * count_losses(now)
                     if scores[option] > best:
                         best = scores[option]
-                        copy_into(kept, sources)
-                    sources[action, other], sources[action, register] = theirs, mine
+                        copy_into(kept, now)
+                    now[action, other], now[action, register] = theirs, mine
                 option = draw_by_logarithm(scores, beta, rng)
                 other = option % n_registers
                 if option < n_registers:
-                    sources[action, register], sources[action, other] = sources[action, other], mine
+                    now[action, register], now[action, other] = now[action, other], mine
                 else:
-                    sources[action, register] = other
+                    now[action, register] = other
     copy_into(sources, kept)
     return best
 
