@@ -8,6 +8,7 @@ A memory that has learned no structure leaves the Bayes filter alone.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
 from functools import partial
 from typing import ClassVar, Final, NamedTuple
@@ -71,6 +72,7 @@ class LearnedStructure(BayesFilter):
 
     def __init__(self, setup: TrialSetup) -> None:
         super().__init__(setup)
+        self._known: tuple[list[FloatArray], float, list[FloatArray]] | None = None
         believed: list[BelievedStructure] = []
         rates = Rates()
         memory = self.memory if self.parameters.learn_structure else None
@@ -119,13 +121,18 @@ class LearnedStructure(BayesFilter):
             each.observe(evidence)
             if felt is not None:
                 each.weigh(felt)
+        self._known = None
         if self._followed:
-            least = self.log_evidence - self._log_scale + np.log(RULED_OUT)
-            self._followed = [each for each in self._followed if log_sum_exp(each.log_joint) > least]
+            (_, *joints), total, _ = self._beliefs()
+            least = total + np.log(RULED_OUT)
+            kept = [log_sum_exp(joint) > least for joint in joints]
+            if not all(kept):
+                self._followed, self._known = list(itertools.compress(self._followed, kept)), None
 
     def predict(self, action: AnyAction) -> None:
         """Predict the effect of an action, the last of ``history``."""
         super().predict(action)
+        self._known = None
         for each in self._followed:
             each.filter.act(action)
 
@@ -141,7 +148,7 @@ class LearnedStructure(BayesFilter):
         """Return ln p(z_0:t | a_1:t)."""
         if not self._followed:
             return super().log_evidence
-        return log_sum_exp(np.concatenate(self._log_joints())) + self._log_scale
+        return self._beliefs()[1] + self._log_scale
 
     def conclude(self) -> IdentityBelief:
         """Return the belief at the end of the trial, all raw trials of the memory sampled again in its light.
@@ -230,16 +237,21 @@ class LearnedStructure(BayesFilter):
     def _plain_chain(self, hypothesis: int) -> tuple[Chain, IntArray] | None:
         return self.chain(hypothesis), self.model.pattern_of[hypothesis]
 
-    def _log_joints(self) -> list[FloatArray]:
-        """Return ln p(O, type, z_0:t | a_1:t) of being plain, then of following each structure, each of shape [H]."""
-        plain = self._log_plain + self._log_identity + self.scaled_log_evidence
-        return [plain, *(each.log_joint for each in self._followed)]
+    def _beliefs(self) -> tuple[list[FloatArray], float, list[FloatArray]]:
+        """Return ln p(O, type, z_0:t | a_1:t), ln p(z_0:t | a_1:t) but for its scale, and p(O, type | z_0:t, a_1:t).
+
+        Of being plain, then of following each structure, each of shape [H]; kept until there is another look.
+        """
+        if self._known is None:
+            plain = self._log_plain + self._log_identity + self.scaled_log_evidence
+            joints = [plain, *(each.log_joint for each in self._followed)]
+            total = log_sum_exp(np.concatenate(joints))
+            self._known = joints, total, [np.exp(joint - total) for joint in joints]
+        return self._known
 
     def _type_beliefs(self) -> list[FloatArray]:
         """Return p(O, type | z_0:t, a_1:t) of being plain, then of following each structure, each of shape [H]."""
-        joints = self._log_joints()
-        total = log_sum_exp(np.concatenate(joints))
-        return [np.exp(joint - total) for joint in joints]
+        return self._beliefs()[2]
 
     def _plain_aspects(self, type_beliefs: list[FloatArray]) -> FloatArray:
         """Return p(O, X_t, plain | z_0:t, a_1:t), shape [H, W]."""

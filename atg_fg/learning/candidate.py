@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from atg_fg.core.patterns import FloatArray, PatternAlphabet
-from atg_fg.learning.likelihood import score_trials
+from atg_fg.learning.likelihood import TrialScores, score_trials
 from atg_fg.learning.rates import Rates, Tally
 from atg_fg.learning.raw_trials import RawTrial
 from atg_fg.learning.shared_structure import SharedStructure
@@ -48,25 +48,30 @@ class Candidate:
         n_before = len(self.log_evidence)
         if n_before == len(trials):
             return
-        fresh = score_trials(self.structure, trials[n_before:], rates, self._alphabet)
-        self.log_evidence = np.concatenate((self.log_evidence, fresh.log_evidence))
-        self.events = np.concatenate((self.events, fresh.events))
-        later: dict[int, list[int]] = {}
-        for number in range(n_before, len(trials)):
-            if owners[number] == len(self.contents):
-                self.contents.append(fresh.contents[number - n_before])
-            else:
-                later.setdefault(owners[number], []).append(number)
+        new, by_owner = trials[n_before:], dict[int, list[RawTrial]]()
+        for owner, trial in zip(owners[n_before:], new, strict=True):
+            by_owner.setdefault(owner, []).append(trial)
+        fresh = np.zeros((len(new), self.structure.n_registers, self._alphabet.n_symbols))
+        met = [owner for owner in by_owner if owner < len(self.contents)]
+        # All trials as those of fresh objects, and the first ones of objects that were met before as theirs.
+        scores = self._learn(met, [*new, *(by_owner[owner][0] for owner in met)], fresh, rates)
+        self.log_evidence = np.concatenate((self.log_evidence, scores.log_evidence[: len(new)]))
+        self.events = np.concatenate((self.events, scores.events[: len(new)]))
+        for owner, contents in zip(owners[n_before:], scores.contents, strict=False):
+            if owner == len(self.contents):
+                self.contents.append(contents)
         # The second trials of all objects at once, then the third, …
-        for rank in range(max(map(len, later.values()), default=0)):
-            again = [owner for owner, numbers in later.items() if len(numbers) > rank]
-            self._learn_contents(again, [trials[later[owner][rank]] for owner in again], rates)
+        for rank in range(1, max(map(len, by_owner.values()))):
+            again = [owner for owner, numbers in by_owner.items() if len(numbers) > rank]
+            self._learn(again, [by_owner[owner][rank] for owner in again], fresh[:0], rates)
 
-    def _learn_contents(self, owners: Sequence[int], trials: Sequence[RawTrial], rates: Rates) -> None:
-        before = np.array([self.contents[owner] for owner in owners])
+    def _learn(self, owners: Sequence[int], trials: Sequence[RawTrial], fresh: FloatArray, rates: Rates) -> TrialScores:
+        """Score trials of fresh objects, and then of known ones, whose contents are learned from these."""
+        before = np.array([*fresh, *(self.contents[owner] for owner in owners)])
         scores = score_trials(self.structure, trials, rates, self._alphabet, before)
-        for owner, contents in zip(owners, scores.contents, strict=True):
+        for owner, contents in zip(owners, scores.contents[len(fresh) :], strict=True):
             self.contents[owner] = contents
+        return scores
 
     def tally(self, trials: Sequence[RawTrial], following: FloatArray) -> Tally:
         """Return the expected numbers of events over all trials, each counted as far as it follows the structure.

@@ -333,10 +333,11 @@ class StructureLearner:
         kept = list(dict.fromkeys(number for each in self._sets for number in each.structures))
         plain = self._of_plain()
         nothing = share_kinds(plain).log_evidence
+        table = kind_table(self._candidates, plain, self.trials)
         alone = {}
         for number, each in enumerate(self._candidates):
             if number not in kept:
-                of = share_kinds(kind_table([each], plain, self.trials))
+                of = share_kinds(table[:, [*range(N_PLAIN), N_PLAIN + number]])
                 alone[number] = of.log_evidence + each.structure.log_prior
         spare = sorted(
             (number for number in alone if alone[number] > nothing - KEPT_WITHIN), key=lambda number: -alone[number]

@@ -62,7 +62,9 @@ class StructureBelief:
     @cached_property
     def _matters(self) -> IntArray:
         """Objects that are not too improbable, and last *unseen*, shape [I]."""
-        return np.union1d(np.flatnonzero(self.identity > UNIMPORTANT), self.model.n_hypotheses - 1)
+        matters = self.identity > UNIMPORTANT
+        matters[-1] = True
+        return np.flatnonzero(matters)
 
     @cached_property
     def joint(self) -> FloatArray:
@@ -71,10 +73,12 @@ class StructureBelief:
         table = np.zeros((model.n_actions, len(matters), model.n_patterns))
         if self.plain.sum() > UNIMPORTANT:
             table += pattern_table(model, next_pattern_joint(model, self.plain), matters)
+        place = np.full(model.n_hypotheses, -1)
+        place[matters] = np.arange(len(matters))
         for each in self.following:
             owners, patterns = each.filter.predicted_patterns()
-            common, places, own = np.intersect1d(matters, owners, assume_unique=True, return_indices=True)
-            table[:, places] += each.belief[common, None] * patterns[:, own]
+            own = place[owners] >= 0
+            table[:, place[owners[own]]] += each.belief[owners[own], None] * patterns[:, own]
         return table
 
     def expected_entropies(self) -> FloatArray:

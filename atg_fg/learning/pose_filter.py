@@ -11,6 +11,7 @@ exactly.
 from __future__ import annotations
 
 import copy
+from functools import cached_property
 from types import ModuleType
 from typing import Final, NamedTuple
 
@@ -175,7 +176,8 @@ class PoseFilter:
         """Take in any evidence as a likelihood of each pattern, shape [|𝒵|], or [H, |𝒵|] for a look of each owner."""
         rows, symbols = self.rows, self._alphabet.symbols
         likelihood = np.broadcast_to(likelihood, (len(self.log_evidence), len(symbols)))
-        registers, shown = self._in_view(rows), self._shown_in_view(rows)
+        registers = self._registers_in_view[rows.pose]
+        shown = self._shown_in_view(rows.pose, rows.table)
         joint = pattern_products(shown, symbols) / distinctness(shown, symbols)[:, None]
         joint *= self._possible[rows.pose, None] * likelihood[rows.owner]
         probability = joint.sum(axis=1)
@@ -198,20 +200,20 @@ class PoseFilter:
         rows = self.rows.take(np.flatnonzero(self.rows.weight * self._importance()[self.rows.owner] > UNIMPORTANT))
         first, group = _runs(rows.owner)
         weights = rows.weight / np.add.reduceat(rows.weight, first)[group]
-        stayed = self._patterns_of(rows, weights * self._rates.slip, first)
-        moved = [
-            self._patterns_of(rows._replace(pose=successors), weights * (1.0 - self._rates.slip), first)
-            for successors in self._poses.successors[rows.pose].T
-        ]
+        # That nothing happens is one more thing that an action may do.
+        poses = np.column_stack((self._successors[rows.pose], rows.pose)).T
+        shares = np.full((len(poses), 1), 1.0 - self._rates.slip)
+        shares[-1] = self._rates.slip
+        patterns = self._patterns_of(poses, rows.table, weights * shares, first)
         noise = self._rates.wrong / len(self._alphabet)
-        return rows.owner[first], (1.0 - self._rates.wrong) * (np.array(moved) + stayed) + noise
+        return rows.owner[first], (1.0 - self._rates.wrong) * (patterns[:-1] + patterns[-1]) + noise
 
     def shown_patterns(self) -> tuple[IntArray, FloatArray]:
         """Return the owners that matter, shape [I], and p(pattern shown now | owner) of each, shape [I, |𝒵|]."""
         rows = self.rows.take(np.flatnonzero(self.rows.weight * self._importance()[self.rows.owner] > UNIMPORTANT))
         first, group = _runs(rows.owner)
         weights = rows.weight / np.add.reduceat(rows.weight, first)[group]
-        return rows.owner[first], self._patterns_of(rows, weights, first)
+        return rows.owner[first], self._patterns_of(rows.pose[None], rows.table, weights[None], first)[0]
 
     def poses_of(self, owner: int) -> dict[int, float]:
         """Return the probability of each pose of an owner that is not negligible."""
@@ -231,8 +233,7 @@ class PoseFilter:
         weight, table = self.rows.weight[own], self.rows.table[own]
         best = int(weight.argmax())
         if weight[best] > (0.5 + EVEN) * weight.sum():
-            table = table[[best]]
-            weight = np.ones(1)
+            return self._contents[table[best]].copy()
         mean: FloatArray = np.einsum("r,rps->ps", weight / weight.sum(), self._contents[table])
         return mean
 
@@ -248,14 +249,10 @@ class PoseFilter:
 
         return pose_kernels
 
-    def _in_view(self, rows: Rows) -> IntArray:
-        """Return the register in each of the J slots, shape [R, J]."""
-        in_view: IntArray = self._registers_in_view[rows.pose]
-        return in_view
-
-    def _shown_in_view(self, rows: Rows) -> list[FloatArray]:
-        """Return the probability of each symbol in each slot, J × [R, S]."""
-        return [self._shown[rows.table, register] for register in self._in_view(rows).T]
+    def _shown_in_view(self, poses: IntArray, tables: IntArray) -> list[FloatArray]:
+        """Return the probability of each symbol in each slot of rows with these poses [..., R], J × [rows, S]."""
+        in_view = np.moveaxis(self._registers_in_view[poses], -1, 0)
+        return [self._shown[tables, registers].reshape(-1, self._shown.shape[2]) for registers in in_view]
 
     def _condition(self, probability: FloatArray, scale: FloatArray) -> tuple[IntArray, FloatArray]:
         """Weigh the rows by a look, drop the negligible ones, and count how many looks were wrong.
@@ -316,27 +313,36 @@ class PoseFilter:
         )
         self.rows = Rows(*rows)
 
-    def _patterns_of(self, rows: Rows, weights: FloatArray, first: IntArray) -> FloatArray:
-        """Return the weighted sum of what rows show, for each owner, shape [I, |𝒵|]."""
-        shown = self._shown_in_view(rows)
-        symbols = self._alphabet.symbols
-        shown[0] = shown[0] * (weights * self._possible[rows.pose] / distinctness(shown, symbols))[:, None]
-        combined = shown[0]
+    def _patterns_of(self, poses: IntArray, tables: IntArray, weights: FloatArray, first: IntArray) -> FloatArray:
+        """Return the weighted sum of what rows show in each of B poses, for each owner, shape [B, I, |𝒵|].
+
+        Args:
+            poses: Shape [B, R].
+            tables: Of each row, shape [R].
+            weights: Shape [B, R].
+            first: The first row of each owner, shape [I].
+        """
+        n_rows, symbols = poses.shape[1], self._alphabet.symbols
+        shown = self._shown_in_view(poses, tables)
+        factors = (weights * self._possible[poses]).ravel() / distinctness(shown, symbols)
+        combined = shown[0] * factors[:, None]
         for probabilities in shown[1:]:
             combined = (combined[:, :, None] * probabilities[:, None, :]).reshape(len(combined), -1)
-        patterns: FloatArray = np.add.reduceat(combined, first)[:, self._places()]
-        return patterns
+        begins = (n_rows * np.arange(len(poses))[:, None] + first).ravel()
+        patterns: FloatArray = np.add.reduceat(combined, begins)[:, self._places]
+        return patterns.reshape(len(poses), len(first), -1)
 
     def _of_slots(self, joint: FloatArray) -> list[FloatArray]:
         """Return the marginal of each slot, shape [J, n_symbols], of a joint of all patterns, shape [J, |𝒵|]."""
         n_slots, shape = self._alphabet.symbols.shape[1], (self._alphabet.n_symbols,)
         grid = np.zeros((len(joint), self._alphabet.n_symbols**n_slots))
-        grid[:, self._places()] = joint
+        grid[:, self._places] = joint
         grid = grid.reshape(len(joint), *shape * n_slots)
         return [grid.sum(axis=tuple(other + 1 for other in range(n_slots) if other != slot)) for slot in range(n_slots)]
 
+    @cached_property
     def _places(self) -> IntArray:
-        """Return where each pattern is among all combinations of symbols, shape [|𝒵|]."""
+        """Where each pattern is among all combinations of symbols, shape [|𝒵|]."""
         symbols = self._alphabet.symbols
         places: IntArray = np.ravel_multi_index(tuple(symbols.T), (self._alphabet.n_symbols,) * symbols.shape[1])
         return places

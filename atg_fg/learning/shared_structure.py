@@ -11,9 +11,10 @@ them, and with the mode that it leads to. A pose is a mode and an arrangement of
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from operator import itemgetter
 from typing import TYPE_CHECKING, Final, NamedTuple
 
 import numpy as np
@@ -180,7 +181,10 @@ class SharedStructure:
         Raises:
             TooLargeError: It has more than ``limit`` poses.
         """
-        return _closure(self, limit)
+        closure = _closure(self, limit)
+        if closure is None:
+            raise TooLargeError(f"structure: more than {limit} poses; expected at most that many")
+        return closure
 
     def to_networkx(self) -> networkx.MultiDiGraph[int]:
         """Return the poses as nodes with ``registers``, those at each place, and an edge with ``action`` an action."""
@@ -265,22 +269,26 @@ def _renamed(structure: SharedStructure, modes: Sequence[int]) -> SharedStructur
 
 
 @lru_cache(maxsize=256)
-def _closure(structure: SharedStructure, limit: int) -> Poses:
+def _closure(structure: SharedStructure, limit: int) -> Poses | None:
+    """Return the closure of the actions, ``None`` if it has more poses than ``limit``: that is kept as well."""
     # Registers out of all view may make more poses, which look alike for ever.
     at_most = limit if structure.n_modes == 1 else 4 * limit
     upright = (0, tuple(range(structure.n_registers)))
     number, poses, successors = {upright: 0}, [upright], []
+    turns: list[list[tuple[int, Callable[[tuple[int, ...]], tuple[int, ...]]]]] = []
+    for mode in range(structure.n_modes):
+        steps = [structure.step(mode, action) for action in range(structure.n_actions)]
+        turns.append([(target, itemgetter(*of) if len(of) > 1 else tuple) for target, of in steps])
     for mode, pose in poses:  # grows while it is walked: breadth first
         row = []
-        for action in range(structure.n_actions):
-            target, sources = structure.step(mode, action)
-            turned = target, tuple(pose[source] for source in sources)
-            if turned not in number:
-                if len(poses) >= at_most:
-                    raise TooLargeError(f"structure: more than {at_most} poses; expected at most that many")
-                number[turned] = len(poses)
+        for target, turn in turns[mode]:
+            turned = target, turn(pose)
+            found = number.setdefault(turned, len(poses))
+            if found == len(poses):
+                if found >= at_most:
+                    return None
                 poses.append(turned)
-            row.append(number[turned])
+            row.append(found)
         successors.append(row)
     classes = _classes(poses, number)
     registers = np.array([pose for _, pose in poses], dtype=np.int64)
@@ -288,7 +296,7 @@ def _closure(structure: SharedStructure, limit: int) -> Poses:
     if structure.n_modes > 1:
         result = _minimal(result, classes, structure.n_slots)
         if len(result.registers) > limit:
-            raise TooLargeError(f"structure: more than {limit} poses; expected at most that many")
+            return None
     for table in result:
         table.flags.writeable = False  # it is shared by all who ask
     return result
