@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.inference.kernels.compilation import compiled, compiled_within
@@ -13,11 +14,13 @@ _N_KNOWN = 4093
 #: Entries of the table of histories: it begins anew when it is full.
 _N_ENTRIES = 1 << 17
 
+#: Without a sign: nobody asks of each index whether it counts from the end.
+Indices = NDArray[np.uint32]
 #: What a register has shown in a trial so far, each history once, the empty one first: which of the different looks
 #: each one was [N, T, J], these looks [L, V], the history that each look makes of each, 0 if not known yet [H, L],
 #: prior · Π likelihoods [H, V], ln of its sum [H], and how many are known [1]. Maps differ in which registers are
 #: where, so that few histories come again and again.
-Histories = tuple[IntArray, FloatArray, IntArray, FloatArray, FloatArray, IntArray]
+Histories = tuple[Indices, FloatArray, Indices, FloatArray, FloatArray, Indices]
 
 
 @compiled
@@ -64,7 +67,7 @@ def histories_of(looks: FloatArray, n_slots: int, prior: FloatArray) -> Historie
 
 @compiled_within
 def evidence_of(
-    sources: IntArray, actions: IntArray, lengths: IntArray, plain: FloatArray, histories: Histories
+    sources: Indices, actions: Indices, lengths: IntArray, plain: FloatArray, histories: Histories
 ) -> float:
     """Return what ``map_log_evidence`` does, and add what registers showed to the histories that are known."""
     number, rows, longer, product, log_evidence, n_known = histories
@@ -132,7 +135,6 @@ def anneal_maps(
         rng: Draws.
     """
     n_actions, n_registers = sources.shape
-    # Indices without a sign: nobody asks each of them whether it counts from the end.
     now, actions = sources.astype(np.uint32), trials.actions.astype(np.uint32)
     histories = histories_of(trials.looks, n_slots, prior)
     best, kept = -np.inf, now.copy()
@@ -179,7 +181,7 @@ def anneal_maps(
 
 
 @compiled_within
-def count_losses(sources: IntArray) -> int:
+def count_losses(sources: Indices) -> int:
     """Return how many actions lose content."""
     n_losses = 0
     for action in range(len(sources)):

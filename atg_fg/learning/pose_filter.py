@@ -233,7 +233,7 @@ class PoseFilter:
         weight, table = self.rows.weight[own], self.rows.table[own]
         best = int(weight.argmax())
         if weight[best] > (0.5 + EVEN) * weight.sum():
-            return self._contents[table[best]].copy()
+            table, weight = table[[best]], np.ones(1)
         mean: FloatArray = np.einsum("r,rps->ps", weight / weight.sum(), self._contents[table])
         return mean
 
