@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from atg_fg.core.errors import AtgError
-from atg_fg.storage.database.distrust import DistrustfulConnection
+from atg_fg.storage.database.connection import DistrustfulConnection
 from tests.torture.fuzz import CORPUS, KINDS, as_file
 from tests.torture.power import cut_power, library_of_python
 from tests.torture.reading import read_as

@@ -9,7 +9,7 @@ from typing import Annotated, Any
 
 import typer
 
-from atg_fg.cli import memory_compact, memory_duplicates, memory_files, options, structure
+from atg_fg.cli import memory_duplicates, memory_files, options, structure
 from atg_fg.cli.terminal import say
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
@@ -33,7 +33,7 @@ app.command()(memory_files.export)
 app.command("import")(memory_files.import_files)
 app.command()(memory_files.merge)
 app.command()(memory_files.diff)
-app.command()(memory_compact.compact)
+app.command()(memory_files.compact)
 app.command()(memory_duplicates.duplicates)
 app.command()(memory_duplicates.unmerge)
 app.command()(memory_duplicates.rename)

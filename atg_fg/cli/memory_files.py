@@ -1,4 +1,4 @@
-"""``atg-fg memory export``, ``import``, ``merge`` and ``diff``: memories from file to file."""
+"""``atg-fg memory export``, ``import``, ``merge``, ``diff`` and ``compact``: memories from file to file."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ import typer
 
 from atg_fg.cli import options
 from atg_fg.cli.terminal import say, say_document
+from atg_fg.core.compact.compact_memory import CompactMemory
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.records import Experiment, TrialSummary
@@ -19,6 +20,7 @@ from atg_fg.learning.completion import completed_atg
 from atg_fg.learning.memory_union import unite
 from atg_fg.learning.structured_memory import StructuredMemory
 from atg_fg.storage import memory_files, memory_json, plain_files
+from atg_fg.storage.compact_file import SUFFIX, is_compact
 from atg_fg.storage.database.connection import is_database, writing
 from atg_fg.storage.database.copying import add_records, records_in, records_in_log
 from atg_fg.storage.database.memory_reading import holds_memory, read_memory_rows
@@ -216,3 +218,24 @@ def _told(found: dict[str, Any]) -> list[str]:
 
 def _number(value: Any) -> Any:
     return len(value) if isinstance(value, list) else value
+
+
+def compact(
+    file: options.MemoryFile,
+    output: Annotated[Path, typer.Option(writable=True, help="File of arrays to write, .npz.", show_default=False)],
+    json_file: options.JsonFile = None,
+) -> None:
+    """Write the ATGs of a memory as arrays, which load a hundred times as fast; for the engine large-memory.
+
+    Example: atg-fg memory compact memory.json --output memory.npz
+    """
+    if not is_compact(output):
+        raise InvalidInputError(f"--output: {str(output)!r}; expected a name that ends in {SUFFIX}")
+    plain_files.check_writable(output)
+    memory = memory_files.load_memory(file)
+    memory_files.save_memory(memory, output)
+    made = CompactMemory.of(memory)
+    document = {"command": "memory compact", "objects": len(made), "bytes": made.nbytes}
+    options.write_json(document, json_file)
+    if json_file != "-":
+        say(f"{output}: {len(made)} ATGs, {made.nbytes} bytes in memory")

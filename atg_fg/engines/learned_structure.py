@@ -21,9 +21,7 @@ from atg_fg.core.log_math import log_of, log_sum_exp
 from atg_fg.core.patterns import Evidence, FloatArray, IntArray
 from atg_fg.core.records import Mistake
 from atg_fg.engines.bayes_filter import BayesFilter
-from atg_fg.engines.followed_chain import FollowedChain
-from atg_fg.engines.followed_plain import FollowedPlain
-from atg_fg.engines.followed_structure import FollowedStructure
+from atg_fg.engines.followed import FollowedChain, FollowedPlain, FollowedStructure
 from atg_fg.inference.belief_components import LEAST_PROBABILITY, BeliefComponent, components_of, shown_patterns_of
 from atg_fg.inference.belief_tree import BeliefNode
 from atg_fg.inference.chain import Chain

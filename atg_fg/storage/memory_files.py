@@ -17,8 +17,7 @@ from atg_fg.storage.compact_file import is_compact, load_compact_memory, save_co
 from atg_fg.storage.database.connection import WAIT, is_database, open_to_read, open_to_write, translated, written
 from atg_fg.storage.database.keeper import DatabaseKeeper
 from atg_fg.storage.database.memory_reading import database_holds_memory, holds_memory, load_database, read_memory_rows
-from atg_fg.storage.database.memory_writing import replace_memory
-from atg_fg.storage.database.saving import save_database
+from atg_fg.storage.database.memory_writing import replace_memory, save_database
 from atg_fg.storage.memory_json import memory_from_json, memory_to_json
 from atg_fg.storage.plain_files import is_plain_file, read_text_file, write_bytes_atomically
 

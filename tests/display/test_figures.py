@@ -12,8 +12,7 @@ from atg_fg.core.memory import RobotMemory
 from atg_fg.display import figures
 from atg_fg.display.atg_picture import draw_atg
 from atg_fg.display.success_plots import plot_success
-from atg_fg.display.trial_course import course_of
-from atg_fg.display.trial_plots import plot_atg, plot_belief, plot_entropy
+from atg_fg.display.trial_plots import course_of, plot_atg, plot_belief, plot_entropy
 from atg_fg.engines import begin_trial
 from atg_fg.experiments.scores import TestResult
 from atg_fg.experiments.trial import run_trial

@@ -13,8 +13,13 @@ from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, PatternAlphabet
 from atg_fg.engines import begin_trial
 from atg_fg.engines.bayes_filter import BayesFilter
-from atg_fg.engines.gtsam_cells import EdgesInto, RowKinds
-from atg_fg.engines.gtsam_elimination import GtsamElimination, HypotheticalFactors, TransitionFactors
+from atg_fg.engines.gtsam_elimination import (
+    EdgesInto,
+    GtsamElimination,
+    HypotheticalFactors,
+    RowKinds,
+    TransitionFactors,
+)
 from atg_fg.inference.expected_entropy import NextPatternJoint, next_pattern_joint, pattern_table
 from atg_fg.inference.factor_graph import RecognitionGraph
 from atg_fg.inference.interface import Inference

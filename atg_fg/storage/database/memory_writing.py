@@ -6,6 +6,7 @@ import json
 import sqlite3
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 from atg_fg.core.aspect_graph import AspectTransitionGraph
@@ -13,9 +14,12 @@ from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.merging import Merge
 from atg_fg.core.patterns import PatternAlphabet
+from atg_fg.core.records import Experiment, TrialSummary
 from atg_fg.core.sense import SensedTrial
 from atg_fg.learning.raw_trials import RawTrial
 from atg_fg.learning.structured_memory import StructuredMemory
+from atg_fg.storage.database import trial_rows
+from atg_fg.storage.database.connection import writing
 from atg_fg.storage.evidence_json import write_evidence
 from atg_fg.storage.memory_json import write_merge
 from atg_fg.storage.object_sense_json import write_moments, write_object_sense
@@ -249,3 +253,27 @@ def _owners(memory: RobotMemory) -> tuple[str, ...]:
 
 def _compact(value: Any) -> str:
     return json.dumps(value, separators=(",", ":"))
+
+
+def save_database(
+    memory: RobotMemory,
+    path: Path | str,
+    trials: tuple[TrialSummary, ...] = (),
+    experiment: Experiment | None = None,
+) -> None:
+    """Save a memory in place of the one that a database holds, if any; its records of trials stay.
+
+    Args:
+        memory: What is to be remembered.
+        path: The database; made if it is not there.
+        trials: Records to add, in the same transaction.
+        experiment: That these belong to.
+
+    Raises:
+        BusyMemoryError: Another process was writing all the time that this one waited.
+        InvalidInputError: The file cannot be written, or is something else; it is as it was.
+    """
+    with writing(path, create=True) as connection:
+        replace_memory(connection, memory)
+        for trial in trials:
+            experiment = trial_rows.added(connection, experiment, trial)
