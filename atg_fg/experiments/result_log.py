@@ -71,8 +71,7 @@ class ResultLog(Generic[Cell]):
 
 def _count(value: Any, place: str) -> tuple[int, int]:
     """Return a count, and what it is a count of."""
-    if len(read_list(value, place)) != 2:
-        raise InvalidInputError(f"{place}: {brief(value)}; expected a count, and what it is of")
+    read_list(value, place, 2)
     of = whole_number(value[1], place)
     return whole_number(value[0], place, 0, of), of
 

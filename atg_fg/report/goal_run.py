@@ -12,7 +12,7 @@ from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.report.content import Report, TrialPage, shown_parameters
 from atg_fg.report.summaries import looks_of, told_truth, told_verdict, with_graphs
-from atg_fg.storage.checked_json import check_format, parse_json, read_info, read_list, read_object
+from atg_fg.storage.checked_json import check_format, parse_json, read_entries, read_info, read_list, read_object
 from atg_fg.storage.plain_files import read_gzipped_text
 from atg_fg.storage.trial_log import from_line
 
@@ -43,7 +43,7 @@ def read_goal_run(path: Path, memory: RobotMemory | None) -> Report:
     document = parse_json(text, str(path))
     header = read_object(document, str(path), ("format", "version", "served"), optional=tuple(document))
     check_format(header, GOAL_RUN_FORMAT, str(path))
-    served = read_list(document.pop("served"), f"{path}: served")
+    served = read_entries(document.pop("served"), f"{path}: served")
     read_info(document, str(path))
     if not served:
         raise InvalidInputError(f"{path}: served: no goals; expected at least one")
@@ -54,12 +54,9 @@ def read_goal_run(path: Path, memory: RobotMemory | None) -> Report:
         for name, usual in (("n_objects", 100), ("n_remembered", 20))
     )
     n_unseen = max(n_objects - n_remembered, 1)
-    pages = [
-        _page(entry, number, n_unseen, memory, assumptions, f"{path}: served[{number}]")
-        for number, entry in enumerate(served)
-    ]
+    pages = [_page(entry, number, n_unseen, memory, assumptions, where) for number, (entry, where) in enumerate(served)]
     header = {key: value for key, value in document.items() if key not in ("format", "version")}
-    reached = sum(entry["ending"] == "reached" for entry in served)
+    reached = sum(entry["ending"] == "reached" for entry, _ in served)
     title = f"Run {header.get('run', '')}: {reached} of {len(served)} goals reached"
     notes = () if memory is not None else (_NO_BELIEFS,)
     return Report(title, shown_parameters(header), notes, assumptions, tuple(pages))

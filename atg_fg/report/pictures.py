@@ -12,7 +12,7 @@ from atg_fg.core import checks
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.look_info import surest_looks
 from atg_fg.core.records import StepSummary
-from atg_fg.storage.checked_json import read_list
+from atg_fg.storage.checked_json import read_entries
 from atg_fg.storage.plain_files import is_plain_file
 
 _KINDS: Final = {b"\x89PNG\r\n\x1a\n": "image/png", b"\xff\xd8\xff": "image/jpeg"}
@@ -52,12 +52,10 @@ def thumbnails(looks: Iterable[tuple[str, StepSummary]], folder: Path, room: int
 
 
 def _confidences(step: StepSummary, place: str) -> list[float | None]:
-    stated = read_list(step.truth.get("confidences") or [], place)
+    stated = read_entries(step.truth.get("confidences") or [], place)
     if len(stated) not in (0, len(step.observed)):
         raise InvalidInputError(f"{place}: {len(stated)} entries; expected {len(step.observed)}")
-    return [
-        None if sure is None else checks.number(sure, f"{place}[{slot}]", 0.0, 1.0) for slot, sure in enumerate(stated)
-    ]
+    return [None if sure is None else checks.number(sure, where, 0.0, 1.0) for sure, where in stated]
 
 
 def _crop_address(name: object, folder: Path, place: str) -> str:

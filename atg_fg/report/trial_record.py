@@ -18,7 +18,7 @@ from atg_fg.report.content import Look, Named, Report, TrialPage, shown_paramete
 from atg_fg.report.kinds import told_kinds
 from atg_fg.report.pictures import data_address, thumbnails
 from atg_fg.report.summaries import look_of, told_mistakes, told_truth, told_verdict, with_graphs
-from atg_fg.storage.checked_json import check_format, parse_json, read_info, read_list, read_object
+from atg_fg.storage.checked_json import check_format, parse_json, read_entries, read_info, read_list, read_object
 from atg_fg.storage.memory_json import read_assumptions
 from atg_fg.storage.trial_log import read_step, summary_of
 from atg_fg.storage.trial_record import TRIAL_FORMAT
@@ -110,12 +110,8 @@ def _assumptions(header: Mapping[str, Any], memory: RobotMemory | None, path: Pa
 def _look(step: Any, names: list[str], assumptions: Assumptions, folder: Path, place: str) -> tuple[StepSummary, Look]:
     """Return a line as a look."""
     fields = _holding(step, place, "observed", "objects", "unseen", "entropy", "action", "truth")
-    entries = read_list(fields["objects"], f"{place}: objects")
-    if len(entries) != len(names):
-        raise InvalidInputError(f"{place}: objects: {len(entries)} numbers; expected {len(names)}")
-    shares = [
-        checks.number(entry, f"{place}: objects[{index}]", 0.0, 1.0, slack=1e-6) for index, entry in enumerate(entries)
-    ]
+    entries = read_entries(fields["objects"], f"{place}: objects", len(names))
+    shares = [checks.number(entry, where, 0.0, 1.0, slack=1e-6) for entry, where in entries]
     read = read_step(fields, place, assumptions)
     frame = data_address(fields["frame"], folder, f"{place}: frame") if "frame" in fields else None
     return read, replace(

@@ -13,7 +13,7 @@ from atg_fg.core.checks import number, plain_text, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.senses.camera_calibration import Calibration
 from atg_fg.senses.tags import Tags, check_ids, dictionary_name
-from atg_fg.storage.checked_json import check_format, parse_json, placed, read_list, read_object
+from atg_fg.storage.checked_json import check_format, parse_json, placed, read_entries, read_list, read_object
 from atg_fg.storage.plain_files import read_text_file
 
 CALIBRATION_FORMAT: Final = "atg-fg/camera"
@@ -44,9 +44,7 @@ def read_calibration(path: Path | str) -> Calibration:
     keys = ("format", "version", "image_size", "intrinsics", "distortion")
     read_object(document, place, keys, ("error_pixels", "pictures"))
     check_format(document, CALIBRATION_FORMAT, place)
-    size = read_list(document["image_size"], f"{place}: image_size")
-    if len(size) != 2:
-        raise InvalidInputError(f"{place}: image_size: {size!r}; expected width and height")
+    size = read_list(document["image_size"], f"{place}: image_size", 2)
     width, height = (whole_number(side, f"{place}: image_size", 1) for side in size)
     with placed(place):
         return Calibration(
@@ -124,8 +122,7 @@ def read_tags(path: Path | str) -> CubeTags:
     check_format(document, TAGS_FORMAT, place)
     size = number(document["size_metres"], f"{place}: size_metres", least=0.0)
     ids = _ids(document["ids"], f"{place}: ids")
-    cubes = read_list(document.get("cubes", []), f"{place}: cubes")
-    faces = tuple(_ids(each, f"{place}: cubes[{index}]") for index, each in enumerate(cubes))
+    faces = tuple(_ids(each, where) for each, where in read_entries(document.get("cubes", []), f"{place}: cubes"))
     with placed(place):
         return CubeTags(plain_text(document["dictionary"], "dictionary"), size, ids, faces)
 

@@ -8,7 +8,7 @@ from __future__ import annotations
 import json
 import math
 from collections import Counter
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from typing import Any, Final, NoReturn
 
@@ -78,11 +78,26 @@ def read_object(value: Any, place: str, keys: tuple[str, ...], optional: tuple[s
     return value
 
 
-def read_list(value: Any, place: str) -> list[Any]:
-    """Return ``value`` if it is a list."""
+def read_list(value: Any, place: str, length: int | None = None) -> list[Any]:
+    """Return ``value`` if it is a list, of this length if one is given."""
     if not isinstance(value, list):
         raise InvalidInputError(f"{place}: {brief(value)}; expected a list")
+    if length is not None and len(value) != length:
+        raise InvalidInputError(f"{place}: {len(value)} entries; expected {length}")
     return value
+
+
+def read_entries(value: Any, place: str, length: int | None = None) -> list[tuple[Any, str]]:
+    """Return each entry of a list with its own place; ``length`` is as for ``read_list``."""
+    return [(entry, f"{place}[{index}]") for index, entry in enumerate(read_list(value, place, length))]
+
+
+def read_array(value: Any, place: str, shape: Sequence[int], read: Callable[[Any, str], Any]) -> list[Any]:
+    """Return lists in lists of this shape, with each entry as ``read`` returns it, given its place."""
+    entries = read_entries(value, place, shape[0])
+    if len(shape) > 1:
+        return [read_array(entry, where, shape[1:], read) for entry, where in entries]
+    return [read(entry, where) for entry, where in entries]
 
 
 def read_info(value: Any, place: str) -> dict[str, Any]:

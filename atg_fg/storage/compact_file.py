@@ -18,7 +18,7 @@ from atg_fg.core.compact.columns import AnyIntArray
 from atg_fg.core.compact.compact_memory import CompactMemory, GraphArrays, compacted
 from atg_fg.core.errors import InvalidInputError, TooLargeError
 from atg_fg.core.patterns import IntArray
-from atg_fg.storage.checked_json import check_format, parse_json, placed, read_list, read_object
+from atg_fg.storage.checked_json import check_format, parse_json, placed, read_entries, read_object
 from atg_fg.storage.limits import refuse_size, unpacked_limit
 from atg_fg.storage.memory_json import read_assumptions, write_assumptions
 from atg_fg.storage.plain_files import read_bytes_file, starts_with, write_bytes_atomically
@@ -92,9 +92,7 @@ def load_compact_memory(path: Path | str) -> CompactMemory:
     header = read_object(parse_json(text, f"{place}: header"), place, ("format", "version", "assumptions", "names"))
     check_format(header, COMPACT_FORMAT, place)
     assumptions = read_assumptions(header["assumptions"], f"{place}: assumptions")
-    names = read_list(header["names"], f"{place}: names")
-    for number, name in enumerate(names):
-        plain_text(name, f"{place}: names[{number}]")
+    names = [plain_text(name, where) for name, where in read_entries(header["names"], f"{place}: names")]
     if len(set(names)) < len(names):
         raise InvalidInputError(f"{place}: names: one is repeated; expected unique names")
     arrays = GraphArrays(**read)

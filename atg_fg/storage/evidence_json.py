@@ -16,7 +16,7 @@ from atg_fg.learning.evidence_learner import MOST_RIVALS, SavedEvidence
 from atg_fg.learning.raw_trials import RawTrial, Reassignment
 from atg_fg.learning.saved_chain import SavedChain
 from atg_fg.learning.structured_memory import StructuredMemory
-from atg_fg.storage.checked_json import read_list, read_object
+from atg_fg.storage.checked_json import read_array, read_entries, read_list, read_object
 from atg_fg.storage.structure_json import read_structure, write_structure
 
 #: Chains, and states of an automaton, that a file may have.
@@ -82,10 +82,8 @@ def read_evidence(value: Any, memory: StructuredMemory, place: str) -> None:
     parts = ("sampled", "log_evidence", "weights", "noise", "chains")
     fields = read_object(value, place, (), (*parts, "gain", "reassignments"))
     trials = memory.learner.trials
-    events = read_list(fields.get("reassignments", []), f"{place}.reassignments")
-    reassignments = [
-        _read_event(event, len(trials), f"{place}.reassignments[{index}]") for index, event in enumerate(events)
-    ]
+    events = read_entries(fields.get("reassignments", []), f"{place}.reassignments")
+    reassignments = [_read_event(event, len(trials), where) for event, where in events]
     saved, gain = None, None
     if set(parts) & set(fields):
         missing = [part for part in parts if part not in fields]
@@ -99,13 +97,10 @@ def read_evidence(value: Any, memory: StructuredMemory, place: str) -> None:
 def _read_saved(fields: dict[str, Any], memory: StructuredMemory, place: str) -> SavedEvidence:
     trials = memory.learner.trials
     sampled = whole_number(fields["sampled"], f"{place}.sampled", 1, len(trials))
-    entries = read_list(fields["chains"], f"{place}.chains")
+    entries = read_entries(fields["chains"], f"{place}.chains")
     if not 1 <= len(entries) <= _MAX_CHAINS:
         raise InvalidInputError(f"{place}.chains: {len(entries)}; expected 1 to {_MAX_CHAINS}")
-    chains = [
-        _read_chain(entry, memory.assumptions, trials[:sampled], f"{place}.chains[{index}]")
-        for index, entry in enumerate(entries)
-    ]
+    chains = [_read_chain(entry, memory.assumptions, trials[:sampled], where) for entry, where in entries]
     weights = _numbers(fields["weights"], (len(chains),), 0.0, 1.0, f"{place}.weights")
     noise = _read_noise(fields["noise"], memory.assumptions.alphabet.n_symbols, f"{place}.noise")
     log_evidence = number(fields["log_evidence"], f"{place}.log_evidence")
@@ -146,30 +141,30 @@ def _read_chain(value: Any, assumptions: Assumptions, trials: Sequence[RawTrial]
         shape = (len(assumptions.actions), n_states)
         successors = _whole(fields["successors"], shape, n_states - 1, f"{place}.successors")
     n_trials = len(trials)
-    own = read_list(fields.get("own", []), f"{place}.own")
+    own = read_entries(fields.get("own", []), f"{place}.own")
     rival = None
     if "rival" in fields:
-        group, evidence = _pair(fields["rival"], f"{place}.rival")
+        group, evidence = read_list(fields["rival"], f"{place}.rival", 2)
         rival = (whole_number(group, f"{place}.rival[0]", 0, MOST_RIVALS - 1), number(evidence, f"{place}.rival[1]"))
-    slips = read_list(fields["slips"], f"{place}.slips")
-    wrong = read_list(fields.get("wrong", []), f"{place}.wrong")
+    slips = read_entries(fields["slips"], f"{place}.slips")
+    wrong = read_entries(fields.get("wrong", []), f"{place}.wrong")
     return SavedChain(
         maps,
         tuple(map(tuple, successors.tolist())),
-        tuple(_read_own(each, n_trials, successors.shape, f"{place}.own[{index}]") for index, each in enumerate(own)),
+        tuple(_read_own(each, n_trials, successors.shape, where) for each, where in own),
         tuple(_whole(fields["owner"], (n_trials,), n_trials + 1, f"{place}.owner").tolist()),
         tuple(_whole(fields["start"], (n_trials,), n_states - 1, f"{place}.start").tolist()),
-        tuple(_read_slip(slip, trials, f"{place}.slips[{index}]") for index, slip in enumerate(slips)),
+        tuple(_read_slip(slip, trials, where) for slip, where in slips),
         number(fields["slip"], f"{place}.slip", 1e-12, 1.0 - 1e-12),
         number(fields["score"], f"{place}.score"),
         rival,
-        tuple(_read_wrong(look, trials, f"{place}.wrong[{index}]") for index, look in enumerate(wrong)),
+        tuple(_read_wrong(look, trials, where) for look, where in wrong),
         number(fields.get("error", SavedChain._field_defaults["error"]), f"{place}.error", 1e-12, 1.0 - 1e-12),
     )
 
 
 def _read_own(value: Any, n_trials: int, shape: tuple[int, ...], place: str) -> tuple[int, tuple[tuple[int, ...], ...]]:
-    cluster, successors = _pair(value, place)
+    cluster, successors = read_list(value, place, 2)
     if not shape[0]:
         raise InvalidInputError(f"{place}: an automaton beside maps; expected none")
     table = _whole(successors, shape, shape[1] - 1, f"{place}[1]")
@@ -177,7 +172,7 @@ def _read_own(value: Any, n_trials: int, shape: tuple[int, ...], place: str) -> 
 
 
 def _read_slip(value: Any, trials: Sequence[RawTrial], place: str) -> tuple[int, int]:
-    trial, action = _pair(value, place)
+    trial, action = read_list(value, place, 2)
     number_of_trial = whole_number(trial, f"{place}[0]", 0, len(trials) - 1)
     n_actions = len(trials[number_of_trial].actions)
     if not n_actions:
@@ -186,16 +181,9 @@ def _read_slip(value: Any, trials: Sequence[RawTrial], place: str) -> tuple[int,
 
 
 def _read_wrong(value: Any, trials: Sequence[RawTrial], place: str) -> tuple[int, int]:
-    trial, look = _pair(value, place)
+    trial, look = read_list(value, place, 2)
     number_of_trial = whole_number(trial, f"{place}[0]", 0, len(trials) - 1)
     return number_of_trial, whole_number(look, f"{place}[1]", 0, len(trials[number_of_trial].detections) - 1)
-
-
-def _pair(value: Any, place: str) -> tuple[Any, Any]:
-    entries = read_list(value, place)
-    if len(entries) != 2:
-        raise InvalidInputError(f"{place}: {len(entries)} entries; expected 2")
-    return entries[0], entries[1]
 
 
 def _read_event(value: Any, n_trials: int, place: str) -> Reassignment:
@@ -207,20 +195,9 @@ def _read_event(value: Any, n_trials: int, place: str) -> Reassignment:
 
 
 def _whole(value: Any, shape: tuple[int, ...], most: int, place: str) -> np.ndarray[Any, np.dtype[np.int64]]:
-    entries = read_list(value, place)
-    if len(entries) != shape[0]:
-        raise InvalidInputError(f"{place}: {len(entries)} entries; expected {shape[0]}")
-    if len(shape) > 1:
-        return np.array([_whole(entry, shape[1:], most, f"{place}[{index}]") for index, entry in enumerate(entries)])
-    numbers = [whole_number(entry, f"{place}[{index}]", 0, most) for index, entry in enumerate(entries)]
-    return np.array(numbers, dtype=np.int64)
+    entries = read_array(value, place, shape, lambda entry, where: whole_number(entry, where, 0, most))
+    return np.array(entries, dtype=np.int64)
 
 
 def _numbers(value: Any, shape: tuple[int, ...], least: float, most: float, place: str) -> FloatArray:
-    entries = read_list(value, place)
-    if len(entries) != shape[0]:
-        raise InvalidInputError(f"{place}: {len(entries)} entries; expected {shape[0]}")
-    if len(shape) > 1:
-        rows = [_numbers(entry, shape[1:], least, most, f"{place}[{index}]") for index, entry in enumerate(entries)]
-        return np.array(rows)
-    return np.array([number(entry, f"{place}[{index}]", least, most) for index, entry in enumerate(entries)])
+    return np.array(read_array(value, place, shape, lambda entry, where: number(entry, where, least, most)))

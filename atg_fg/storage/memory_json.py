@@ -12,7 +12,7 @@ from atg_fg.core.memory import RobotMemory
 from atg_fg.core.merging import Merge
 from atg_fg.core.patterns import PatternAlphabet
 from atg_fg.learning.structured_memory import StructuredMemory
-from atg_fg.storage.checked_json import check_format, parse_json, placed, read_list, read_object
+from atg_fg.storage.checked_json import check_format, parse_json, placed, read_entries, read_list, read_object
 from atg_fg.storage.evidence_json import read_evidence, write_evidence
 from atg_fg.storage.object_sense_json import read_moments, read_object_senses, write_moments, write_object_sense
 from atg_fg.storage.sense_json import read_sense, write_sense
@@ -62,8 +62,8 @@ def memory_from_document(value: Any, place: str = "memory") -> RobotMemory:
     check_format(document, MEMORY_FORMAT, place)
     assumptions = read_assumptions(document["assumptions"], f"{place}: assumptions")
     memory = read_memory(document["memory"], assumptions, f"{place}: memory")
-    entries = read_list(document.get("merges", []), f"{place}: merges")
-    merges = [_read_merge(entry, assumptions, f"{place}: merges[{index}]") for index, entry in enumerate(entries)]
+    entries = read_entries(document.get("merges", []), f"{place}: merges")
+    merges = [_read_merge(entry, assumptions, where) for entry, where in entries]
     sense = read_sense(document["sense"], assumptions, f"{place}: sense") if "sense" in document else None
     learner = None
     if "structure" in document:
@@ -90,12 +90,12 @@ def write_merge(merge: Merge) -> dict[str, Any]:
 def _read_merge(value: Any, assumptions: Assumptions, place: str) -> Merge:
     """Return the merge at ``place``."""
     fields = read_object(value, place, ("kept", "dropped", "position", "trials"))
-    trials = read_list(fields["trials"], f"{place}.trials")
+    trials = read_entries(fields["trials"], f"{place}.trials")
     return Merge(
         read_graph(fields["kept"], assumptions, f"{place}.kept"),
         read_graph(fields["dropped"], assumptions, f"{place}.dropped"),
         whole_number(fields["position"], f"{place}.position", least=0),
-        tuple(whole_number(number, f"{place}.trials[{index}]", least=0) for index, number in enumerate(trials)),
+        tuple(whole_number(number, where, least=0) for number, where in trials),
     )
 
 
@@ -109,10 +109,7 @@ def read_assumptions(value: Any, place: str) -> Assumptions:
     )
     senses = read_object_senses(fields.get("object_senses", []), f"{place}.object_senses")
     texts = {
-        key: tuple(
-            plain_text(name, f"{place}.{key}[{index}]")
-            for index, name in enumerate(read_list(fields.get(key, []), f"{place}.{key}"))
-        )
+        key: tuple(plain_text(name, where) for name, where in read_entries(fields.get(key, []), f"{place}.{key}"))
         for key in ("actions", "slots", "symbols")
     }
     numbers = {
@@ -152,9 +149,9 @@ def write_assumptions(assumptions: Assumptions) -> dict[str, Any]:
 def read_memory(value: Any, assumptions: Assumptions, place: str) -> RobotMemory:
     """Return the robot memory whose list of ATGs is at ``place``."""
     memory = RobotMemory(assumptions)
-    for index, entry in enumerate(read_list(value, place)):
-        graph = read_graph(entry, assumptions, f"{place}[{index}]")
-        with placed(f"{place}[{index}]"):
+    for entry, where in read_entries(value, place):
+        graph = read_graph(entry, assumptions, where)
+        with placed(where):
             memory.add(graph)
     return memory
 
@@ -163,12 +160,10 @@ def read_graph(value: Any, assumptions: Assumptions, place: str) -> AspectTransi
     """Return the ATG at ``place``."""
     fields = read_object(value, place, ("name", "aspects", "transitions"), ("measured",))
     graph = AspectTransitionGraph(plain_text(fields["name"], f"{place}.name"), assumptions)
-    for index, pattern in enumerate(read_list(fields["aspects"], f"{place}.aspects")):
-        where = f"{place}.aspects[{index}]"
+    for pattern, where in read_entries(fields["aspects"], f"{place}.aspects"):
         with placed(where):
             graph.add_aspect(assumptions.alphabet.check_pattern(read_list(pattern, where)))
-    for index, entry in enumerate(read_list(fields["transitions"], f"{place}.transitions")):
-        where = f"{place}.transitions[{index}]"
+    for entry, where in read_entries(fields["transitions"], f"{place}.transitions"):
         edge = read_object(entry, where, ("from", "action", "to", "count"))
         action = assumptions.action_index(edge["action"], f"{where}.action")
         ends = [whole_number(edge[key], f"{where}.{key}", least=0) for key in ("from", "to")]

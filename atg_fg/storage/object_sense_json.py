@@ -10,7 +10,7 @@ from atg_fg.core.checks import number, plain_text, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.object_sense import Moments, ObjectSense, check_measured
 from atg_fg.core.patterns import Measured
-from atg_fg.storage.checked_json import placed, read_list, read_object
+from atg_fg.storage.checked_json import placed, read_entries, read_list, read_object
 
 #: Sums of readings and of their squares are numbers up to here.
 _GREATEST: Final = 1e100
@@ -33,8 +33,7 @@ def write_object_sense(sense: ObjectSense) -> dict[str, Any]:
 def read_object_senses(value: Any, place: str) -> tuple[ObjectSense, ...]:
     """Return the senses of the object that are listed at ``place``."""
     senses = []
-    for index, entry in enumerate(read_list(value, place)):
-        where = f"{place}[{index}]"
+    for entry, where in read_entries(value, place):
         keys, further = ("name", "typical", "spread", "error"), ("unit", "relative", "revealed_by", "worth")
         fields = read_object(entry, where, keys, further)
         revealing = read_list(fields.get("revealed_by", []), where)
@@ -77,8 +76,7 @@ def write_readings(measured: Sequence[Measured]) -> list[list[list[Any]]]:
 def read_readings(value: Any, senses: Sequence[ObjectSense], place: str) -> tuple[Measured, ...]:
     """Return the readings at each look that are listed at ``place``."""
     looks = []
-    for index, entry in enumerate(read_list(value, place)):
-        where = f"{place}[{index}]"
+    for entry, where in read_entries(value, place):
         look: list[tuple[str, float]] = []
         for pair in read_list(entry, where):
             parts = read_list(pair, where)

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.parameters import ModelParameters
-from atg_fg.storage.checked_json import check_format, parse_json, read_object
+from atg_fg.storage.checked_json import check_format, parse_json, placed, read_object
 from atg_fg.storage.plain_files import read_text_file
 
 PRESET_FORMAT: Final = "atg-fg/preset"
@@ -39,10 +39,8 @@ def read_preset(text: str, place: str) -> ModelParameters:
         raise InvalidInputError(f"{place}: expected an object with format, version and parameters")
     check_format(document, PRESET_FORMAT, place)
     values = read_object(document["parameters"], f"{place}: parameters", _PARAMETERS, _OPTIONAL)
-    try:
+    with placed(f"{place}: parameters"):
         return ModelParameters(**values)
-    except InvalidInputError as error:
-        raise InvalidInputError(f"{place}: parameters: {error}") from error
 
 
 def _packaged(name: str) -> ModelParameters:

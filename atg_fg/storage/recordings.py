@@ -17,7 +17,15 @@ from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.object_sense import GREATEST_READING, ObjectSense
 from atg_fg.core.patterns import Measured
 from atg_fg.core.recordings import RecordedLook, RecordedTrial, Recording, senses_of, used_labels
-from atg_fg.storage.checked_json import check_format, parse_json, read_list, read_object, without_none
+from atg_fg.storage.checked_json import (
+    check_format,
+    parse_json,
+    placed,
+    read_entries,
+    read_list,
+    read_object,
+    without_none,
+)
 from atg_fg.storage.object_sense_json import read_object_senses, write_object_sense
 from atg_fg.storage.plain_files import read_text_file, write_bytes_atomically
 from atg_fg.storage.recording_csv import CsvReader, Fault
@@ -179,11 +187,9 @@ def _read(path: Path | str, spec: RecordingSpec) -> tuple[Recording, list[Fault]
     text = read_text_file(path, packed=True)
     if text.lstrip(" \n").startswith("{"):
         return _of_lines(text, str(path), spec), []
-    try:
+    with placed(str(path)):
         reader = CsvReader(text, spec.slots, spec.labels, spec.actions, spec.senses or ())
         trials = reader.trials()
-    except InvalidInputError as error:
-        raise InvalidInputError(f"{path}: {error}") from error
     columns = [name for weights in reader.columns.weights for _, name in weights]
     senses = _with_found(spec.senses or (), [name for _, name in reader.columns.readings])
     return _made(trials, spec._replace(slots=reader.columns.slots, senses=senses), columns, str(path)), reader.faults
@@ -249,21 +255,15 @@ def _read_trial(value: Any, place: str, spec: RecordingSpec) -> RecordedTrial:
     fields = read_object(value, place, ("trial", "actions", "looks"), ("object", "confidences", "measured"))
     slots = spec.slots or ()
     looks = read_list(fields["looks"], f"{place}: looks")
-    actions = read_list(fields["actions"], f"{place}: actions")
+    actions = read_entries(fields["actions"], f"{place}: actions")
     if not looks or len(actions) != len(looks) - 1:
         raise InvalidInputError(f"{place}: {len(looks)} looks, {len(actions)} actions; expected one look more")
-    for index, action in enumerate(actions):
-        plain_text(action, f"{place}: actions[{index}]")
+    for action, where in actions:
+        plain_text(action, where)
         if spec.actions is not None and action not in spec.actions:
-            raise InvalidInputError(
-                f"{place}: actions[{index}]: {brief(action)}; expected one of: {listed(spec.actions)}"
-            )
-    stated = read_list(fields.get("confidences", [[]] * len(looks)), f"{place}: confidences")
-    if len(stated) != len(looks):
-        raise InvalidInputError(f"{place}: confidences: {len(stated)} entries; expected {len(looks)}")
-    felt = read_list(fields.get("measured", [None] * len(looks)), f"{place}: measured")
-    if len(felt) != len(looks):
-        raise InvalidInputError(f"{place}: measured: {len(felt)} entries; expected {len(looks)}")
+            raise InvalidInputError(f"{where}: {brief(action)}; expected one of: {listed(spec.actions)}")
+    stated = read_list(fields.get("confidences", [[]] * len(looks)), f"{place}: confidences", len(looks))
+    felt = read_list(fields.get("measured", [None] * len(looks)), f"{place}: measured", len(looks))
     made = tuple(
         _read_look(look, sure, slots, f"{place}: look {index}", spec)._replace(
             measured=_read_measured(readings, spec, f"{place}: look {index}: measured")
@@ -277,7 +277,7 @@ def _read_trial(value: Any, place: str, spec: RecordingSpec) -> RecordedTrial:
     return RecordedTrial(
         plain_text(name, f"{place}: trial"),
         made,
-        tuple(actions),
+        tuple(action for action, _ in actions),
         None if presented is None else plain_text(presented, f"{place}: object"),
     )
 

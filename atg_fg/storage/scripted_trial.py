@@ -16,7 +16,7 @@ from atg_fg.core.object_sense import check_measured
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Confidences, Evidence, PatternAlphabet
 from atg_fg.core.slot_checks import check_confidences
-from atg_fg.storage.checked_json import check_format, parse_json, placed, read_list, read_object
+from atg_fg.storage.checked_json import check_format, parse_json, placed, read_entries, read_list, read_object
 from atg_fg.storage.memory_json import read_assumptions, read_memory
 
 SCRIPT_FORMAT: Final = "atg-fg/scripted-trial"
@@ -63,10 +63,10 @@ def read_script(text: str, place: str = "script") -> ScriptedTrial:
     except InvalidInputError as error:
         raise InvalidInputError(f"{place}: parameters.{error}") from error
     memory = read_memory(document["memory"], assumptions, f"{place}: memory")
-    steps = read_list(document["steps"], f"{place}: steps")
+    steps = read_entries(document["steps"], f"{place}: steps")
     if not steps:
         raise InvalidInputError(f"{place}: steps: empty; expected an observation first")
-    read = [_read_step(step, index, memory, version, f"{place}: steps[{index}]") for index, step in enumerate(steps)]
+    read = [_read_step(step, index, memory, version, where) for index, (step, where) in enumerate(steps)]
     return ScriptedTrial(memory, parameters, tuple(read), place)
 
 

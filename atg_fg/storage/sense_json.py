@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -13,7 +12,7 @@ from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.sense import Reading, Sense, SensedTrial
 from atg_fg.senses.appearance import AppearanceSense
 from atg_fg.senses.feature_space import FeatureSpace
-from atg_fg.storage.checked_json import placed, read_list, read_object
+from atg_fg.storage.checked_json import placed, read_entries, read_list, read_object
 
 
 def write_sense(sense: Sense, assumptions: Assumptions) -> dict[str, Any]:
@@ -50,9 +49,9 @@ def read_sense(value: Any, assumptions: Assumptions, place: str) -> AppearanceSe
     """
     keys = ("features", "mean", "projection", "between", "within", "concentration", "trials")
     fields = read_object(value, place, keys)
-    rows = read_list(fields["projection"], f"{place}.projection")
+    rows = read_entries(fields["projection"], f"{place}.projection")
     width = len(read_list(fields["between"], f"{place}.between"))
-    projection = [_numbers(row, f"{place}.projection[{index}]", width) for index, row in enumerate(rows)]
+    projection = [_numbers(row, where, width) for row, where in rows]
     settings = {name: number(fields[name], f"{place}.{name}") for name in ("within", "concentration")}
     with placed(place):
         space = FeatureSpace(
@@ -62,37 +61,29 @@ def read_sense(value: Any, assumptions: Assumptions, place: str) -> AppearanceSe
             np.array(_numbers(fields["between"], "between", width)),
         )
         sense = AppearanceSense(space, assumptions.alphabet, **settings)
-    entries = read_list(fields["trials"], f"{place}.trials")
-    trials = [
-        _read_trial(entry, assumptions, space.n_dimensions, f"{place}.trials[{index}]")
-        for index, entry in enumerate(entries)
-    ]
-    sense.restore(trials)
+    entries = read_entries(fields["trials"], f"{place}.trials")
+    sense.restore([_read_trial(entry, assumptions, space.n_dimensions, where) for entry, where in entries])
     return sense
 
 
 def _read_trial(value: Any, assumptions: Assumptions, n_dimensions: int, place: str) -> SensedTrial:
     fields = read_object(value, place, ("object", "readings", "classes", "actions"))
-    names = read_list(fields["actions"], f"{place}.actions")
-    actions = [assumptions.action_index(name, f"{place}.actions[{index}]") for index, name in enumerate(names)]
-    looks = {key: read_list(fields[key], f"{place}.{key}") for key in ("readings", "classes")}
+    names = read_entries(fields["actions"], f"{place}.actions")
+    actions = [assumptions.action_index(name, where) for name, where in names]
+    looks = {key: read_entries(fields[key], f"{place}.{key}") for key in ("readings", "classes")}
     for key, found in looks.items():
         if len(found) != len(actions) + 1:
             raise InvalidInputError(
                 f"{place}.{key}: {len(found)} looks, {len(actions)} actions; expected one look more"
             )
     readings = []
-    for index, look in enumerate(looks["readings"]):
-        where = f"{place}.readings[{index}]"
-        slots = read_list(look, where)
-        if len(slots) != len(assumptions.alphabet.slots):
-            raise InvalidInputError(f"{where}: {len(slots)} slots; expected {len(assumptions.alphabet.slots)}")
-        readings.append(tuple(_reading(slot, f"{where}[{j}]", n_dimensions) for j, slot in enumerate(slots)))
+    for look, where in looks["readings"]:
+        slots = read_entries(look, where, len(assumptions.alphabet.slots))
+        readings.append(tuple(_reading(slot, place_of_slot, n_dimensions) for slot, place_of_slot in slots))
     detections = []
-    for index, look in enumerate(looks["classes"]):
-        where = f"{place}.classes[{index}]"
+    for (look, where), read in zip(looks["classes"], readings, strict=True):
         detection = assumptions.alphabet.check_detection(read_list(look, where), where)
-        unread = [symbol for symbol, reading in zip(detection, readings[index], strict=True) if reading is None]
+        unread = [symbol for symbol, reading in zip(detection, read, strict=True) if reading is None]
         if any(symbol is not None for symbol in unread):
             raise InvalidInputError(f"{where}: a class where nothing was measured; expected null")
         detections.append(detection)
@@ -105,7 +96,4 @@ def _reading(value: Any, place: str, length: int) -> Reading:
 
 
 def _numbers(value: Any, place: str, length: int) -> list[float]:
-    found: Sequence[Any] = read_list(value, place)
-    if len(found) != length:
-        raise InvalidInputError(f"{place}: {len(found)} numbers; expected {length}")
-    return [number(entry, f"{place}[{index}]", -GREATEST, GREATEST) for index, entry in enumerate(found)]
+    return [number(entry, where, -GREATEST, GREATEST) for entry, where in read_entries(value, place, length)]

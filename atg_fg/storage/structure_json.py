@@ -19,7 +19,7 @@ from atg_fg.learning.plain_evidence import UNCERTAIN, USUAL, PlainNoise
 from atg_fg.learning.rates import PRIORS, Rates
 from atg_fg.learning.raw_trials import RawTrial
 from atg_fg.learning.shared_structure import SharedStructure
-from atg_fg.storage.checked_json import read_list, read_object
+from atg_fg.storage.checked_json import placed, read_entries, read_list, read_object
 from atg_fg.storage.object_sense_json import read_readings, write_readings
 
 
@@ -62,18 +62,15 @@ def read_learner(value: Any, assumptions: Assumptions, names: Sequence[str], pla
     )
     learner = StructureLearner(assumptions, whole_number(fields["seed"], f"{place}.seed", least=0))
     learner.n_evaluations = whole_number(fields.get("evaluations", 0), f"{place}.evaluations", least=0)
-    candidates = read_list(fields["candidates"], f"{place}.candidates")
+    candidates = read_entries(fields["candidates"], f"{place}.candidates")
     if len(candidates) > MAX_CANDIDATES + MAX_KINDS:
         raise InvalidInputError(
             f"{place}.candidates: {len(candidates)} structures; expected at most {MAX_CANDIDATES + MAX_KINDS}"
         )
-    structures = [
-        read_structure(candidate, assumptions, f"{place}.candidates[{index}]")
-        for index, candidate in enumerate(candidates)
-    ]
+    structures = [read_structure(candidate, assumptions, where) for candidate, where in candidates]
     rates = _read_rates(fields["rates"], f"{place}.rates")
-    entries = read_list(fields["trials"], f"{place}.trials")
-    trials = [_read_trial(entry, assumptions, names, f"{place}.trials[{index}]") for index, entry in enumerate(entries)]
+    entries = read_entries(fields["trials"], f"{place}.trials")
+    trials = [_read_trial(entry, assumptions, names, where) for entry, where in entries]
     noise = _read_noise(fields["uncertain"], f"{place}.uncertain") if "uncertain" in fields else USUAL
     learner.restore([owner for owner, _ in trials], [trial for _, trial in trials], structures, rates, noise)
     return learner
@@ -98,19 +95,13 @@ def _read_trial(value: Any, assumptions: Assumptions, names: Sequence[str], plac
     owner = fields["object"]
     if not isinstance(owner, str) or owner not in names:
         raise InvalidInputError(f"{place}.object: {owner!r}; expected the name of an ATG in this memory")
-    looks = [
-        _read_look(look, assumptions, f"{place}.observed[{index}]")
-        for index, look in enumerate(read_list(fields["observed"], f"{place}.observed"))
-    ]
-    actions = tuple(
-        assumptions.action_index(name, f"{place}.actions[{index}]")
-        for index, name in enumerate(read_list(fields["actions"], f"{place}.actions"))
-    )
-    stated = read_list(fields.get("confidences", []), f"{place}.confidences")
-    confidences = tuple(
-        check_confidences(read_list(look, where), len(assumptions.alphabet.slots), where)
-        for look, where in ((look, f"{place}.confidences[{index}]") for index, look in enumerate(stated))
-    )
+    observed = read_entries(fields["observed"], f"{place}.observed")
+    looks = [_read_look(look, assumptions, where) for look, where in observed]
+    done = read_entries(fields["actions"], f"{place}.actions")
+    actions = tuple(assumptions.action_index(name, where) for name, where in done)
+    stated = read_entries(fields.get("confidences", []), f"{place}.confidences")
+    n_slots = len(assumptions.alphabet.slots)
+    confidences = tuple(check_confidences(read_list(look, where), n_slots, where) for look, where in stated)
     likelihoods = tuple(slots for _, slots in looks)
     detections = tuple(detection for detection, _ in looks)
     measured = read_readings(fields.get("measured", []), assumptions.object_senses, f"{place}.measured")
@@ -179,19 +170,17 @@ def read_structure(value: Any, assumptions: Assumptions, place: str) -> SharedSt
         raise InvalidInputError(f"{place}.registers: {n_registers}; expected at most {MAX_REGISTERS}")
     next_modes: tuple[tuple[int, ...], ...] = ()
     if has_modes:
-        modes = read_list(fields["modes"], f"{place}.modes")
+        modes = read_entries(fields["modes"], f"{place}.modes")
         if not 2 <= len(modes) <= MAX_FILE_MODES:
             raise InvalidInputError(f"{place}.modes: {len(modes)}; expected 2 to {MAX_FILE_MODES} of them")
-        places = [f"{place}.modes[{index}]" for index in range(len(modes))]
-        each = [read_object(mode, where, ("sources", "next")) for mode, where in zip(modes, places, strict=True)]
+        each = [(read_object(mode, where, ("sources", "next")), where) for mode, where in modes]
         maps = [
             source
-            for mode, where in zip(each, places, strict=True)
+            for mode, where in each
             for source in _read_maps(mode["sources"], n_registers, assumptions, f"{where}.sources")
         ]
         next_modes = tuple(
-            _read_next_modes(mode["next"], len(modes), assumptions, f"{where}.next")
-            for mode, where in zip(each, places, strict=True)
+            _read_next_modes(mode["next"], len(modes), assumptions, f"{where}.next") for mode, where in each
         )
     else:
         maps = _read_maps(fields["sources"], n_registers, assumptions, f"{place}.sources")
@@ -210,16 +199,11 @@ def _read_maps(value: Any, n_registers: int, assumptions: Assumptions, place: st
 
 def _read_next_modes(value: Any, n_modes: int, assumptions: Assumptions, place: str) -> tuple[int, ...]:
     by_action = read_object(value, place, assumptions.actions)
-    following = tuple(whole_number(by_action[name], f"{place}.{name}", least=0) for name in assumptions.actions)
-    for name, mode in zip(assumptions.actions, following, strict=True):
-        if mode >= n_modes:
-            raise InvalidInputError(f"{place}.{name}: {mode}; expected 0 to {n_modes - 1}")
-    return following
+    return tuple(whole_number(by_action[name], f"{place}.{name}", 0, n_modes - 1) for name in assumptions.actions)
 
 
 def _read_sources(value: Any, n_registers: int, place: str) -> tuple[int, ...]:
-    entries: Sequence[Any] = read_list(value, place)
-    sources = tuple(whole_number(entry, f"{place}[{index}]", least=0) for index, entry in enumerate(entries))
+    sources = tuple(whole_number(entry, where, least=0) for entry, where in read_entries(value, place))
     if len(sources) != n_registers or max(sources) >= n_registers:
         raise InvalidInputError(f"{place}: {list(sources)}; expected {n_registers} numbers of 0 to {n_registers - 1}")
     return sources
@@ -228,7 +212,5 @@ def _read_sources(value: Any, n_registers: int, place: str) -> tuple[int, ...]:
 def _read_rates(value: Any, place: str) -> Rates:
     """Return the rates at ``place``, or raise ``InvalidInputError`` naming it."""
     fields = read_object(value, place, tuple(PRIORS))
-    try:
+    with placed(place):
         return Rates(**fields)
-    except InvalidInputError as error:
-        raise InvalidInputError(f"{place}: {error}") from error

@@ -15,7 +15,7 @@ from atg_fg.core.checks import number, one_of, plain_text, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import Detection, Evidence
 from atg_fg.core.records import VERDICTS, Mended, Mistake, StepSummary, TrialSummary
-from atg_fg.storage.checked_json import read_info, read_list, read_object, without_none
+from atg_fg.storage.checked_json import read_entries, read_info, read_list, read_object, without_none
 from atg_fg.storage.growing_file import GrowingFile, read_lines
 
 _FORMAT: Final = {"format": "atg-fg/test", "version": 1}
@@ -67,7 +67,7 @@ def from_line(line: Any, place: str, assumptions: Assumptions | None = None) -> 
         raise InvalidInputError(f"{place}: {looks} looks, {len(actions)} actions; expected one look more")
     actions += [None] * (looks - len(actions))
     columns = {
-        name: _column(fields[name] if name in fields else [None] * looks, f"{place}: {name}", length)
+        name: read_list(fields[name] if name in fields else [None] * looks, f"{place}: {name}", length)
         for name, length in (
             ("unseen", looks),
             ("entropy", looks),
@@ -96,7 +96,7 @@ def read_step(fields: Mapping[str, Any], place: str, assumptions: Assumptions | 
     """Return one look of a record; arguments and errors are those of ``from_line``."""
     observed = _detection(fields["observed"], f"{place}: observed", assumptions)
     action, purpose, log_evidence, expected = map(fields.get, ("action", "purpose", "log_evidence", "expected_entropy"))
-    crops = [] if fields.get("crops") is None else _column(fields["crops"], f"{place}: crops", len(observed))
+    crops = [] if fields.get("crops") is None else read_entries(fields["crops"], f"{place}: crops", len(observed))
     if action is not None and assumptions is not None:
         action = one_of(action, f"{place}: action", assumptions.actions)
     if assumptions is None:
@@ -114,7 +114,7 @@ def read_step(fields: Mapping[str, Any], place: str, assumptions: Assumptions | 
         None if purpose is None else plain_text(purpose, f"{place}: purpose"),
         None if log_evidence is None else number(log_evidence, f"{place}: log_evidence"),
         None if expected is None else _expected(expected, f"{place}: expected_entropy", assumptions),
-        tuple(None if each is None else plain_text(each, f"{place}: crops[{slot}]") for slot, each in enumerate(crops)),
+        tuple(None if each is None else plain_text(each, where) for each, where in crops),
     )
 
 
@@ -149,8 +149,8 @@ def summary_of(
     if learned is not None:
         most = None if assumptions is None else len(assumptions.alphabet) - 1
         learned = tuple(
-            None if entry is None else whole_number(entry, f"{place}: learned[{index}]", 0, most)
-            for index, entry in enumerate(_column(learned, f"{place}: learned", len(steps)))
+            None if entry is None else whole_number(entry, where, 0, most)
+            for entry, where in read_entries(learned, f"{place}: learned", len(steps))
         )
     return TrialSummary(
         verdict,
@@ -166,9 +166,8 @@ def summary_of(
 def read_mistakes(value: Any, steps: Sequence[StepSummary], place: str) -> tuple[Mistake, ...]:
     """Return the labels of these looks that were taken for wrong; errors are those of ``from_line``."""
     mistakes = []
-    for index, entry in enumerate(read_list(value, place)):
-        where = f"{place}[{index}]"
-        look, slot, probability = _column(entry, where, 3)
+    for entry, where in read_entries(value, place):
+        look, slot, probability = read_list(entry, where, 3)
         look = whole_number(look, f"{where}[0]", 0, len(steps) - 1)
         slot = whole_number(slot, f"{where}[1]", 0, len(steps[look].observed) - 1)
         if steps[look].observed[slot] is None:
@@ -179,19 +178,11 @@ def read_mistakes(value: Any, steps: Sequence[StepSummary], place: str) -> tuple
 
 def _read_mended(value: Any, place: str) -> tuple[Mended, ...]:
     mended = []
-    for index, entry in enumerate(read_list(value, place)):
-        where = f"{place}[{index}]"
-        trial, old, new = _column(entry, where, 3)
+    for entry, where in read_entries(value, place):
+        trial, old, new = read_list(entry, where, 3)
         names = [plain_text(name, f"{where}[{position}]") for position, name in ((1, old), (2, new))]
         mended.append(Mended(whole_number(trial, f"{where}[0]", 0), *names))
     return tuple(mended)
-
-
-def _column(value: Any, place: str, length: int) -> list[Any]:
-    found = read_list(value, place)
-    if len(found) != length:
-        raise InvalidInputError(f"{place}: {len(found)} entries; expected {length}")
-    return list(found)
 
 
 def _detection(value: Any, place: str, assumptions: Assumptions | None) -> Detection:
