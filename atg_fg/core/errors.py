@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
 
 #: A longer message loses its middle: its beginning says the place, its end what was expected.
 MAX_MESSAGE = 2000
@@ -42,6 +43,21 @@ class CameraError(AtgError, OSError):
 
 class MissingDependencyError(AtgError, ImportError):
     """An optional package that is not installed; the message names the extra that brings it."""
+
+
+@contextmanager
+def needed_by(what: str, package: str, extra: str) -> Iterator[None]:
+    """Say what needs a package, and which extra brings it, where what is imported inside is not installed.
+
+    Raises:
+        MissingDependencyError: It is not.
+    """
+    try:
+        yield
+    except ImportError as error:
+        raise MissingDependencyError(
+            f'{what}: {package} is not installed; expected it from: pip install "atg-fg[{extra}]"'
+        ) from error
 
 
 class WorkerLostError(AtgError, RuntimeError):

@@ -8,7 +8,7 @@ from typing import Any, Final
 
 import numpy as np
 
-from atg_fg.core.errors import InvalidInputError, MissingDependencyError
+from atg_fg.core.errors import InvalidInputError, needed_by
 from atg_fg.core.patterns import FloatArray
 from atg_fg.senses.tags import tag_cells
 from atg_fg.worlds.arcube import FACE_NORMALS
@@ -95,13 +95,8 @@ def _runs(black: Any) -> list[tuple[int, int]]:
 
 
 def _trimesh() -> Any:
-    try:
+    with needed_by("solids", "trimesh, lxml or manifold3d", "print"):
         import lxml  # noqa: F401  trimesh writes 3MF with it
         import manifold3d  # noqa: F401
         import trimesh
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"solids: the package {error.name} is not installed; expected the extra 'print': "
-            'pip install "atg-fg[print]"'
-        ) from error
     return trimesh

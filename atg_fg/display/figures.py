@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from atg_fg.core.errors import InvalidInputError, MissingDependencyError
+from atg_fg.core.errors import InvalidInputError, needed_by
 from atg_fg.core.visible_text import visible
 from atg_fg.storage import plain_files
 
@@ -161,12 +161,8 @@ def figure_class() -> type[Figure]:
     Raises:
         MissingDependencyError: matplotlib is not installed.
     """
-    try:
+    with needed_by("figures", "matplotlib", "viz"):
         from matplotlib.figure import Figure
-    except ImportError as error:
-        raise MissingDependencyError(
-            'figures: matplotlib is not installed; expected it from: pip install "atg-fg[viz]"'
-        ) from error
 
     class NotebookFigure(Figure):
         """A figure that IPython shows by itself, which a bare ``Figure`` does only once pyplot is loaded."""

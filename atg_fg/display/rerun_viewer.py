@@ -13,7 +13,7 @@ from types import ModuleType
 from typing import Any, Final
 
 from atg_fg.core.belief import IdentityBelief
-from atg_fg.core.errors import InvalidInputError, MissingDependencyError
+from atg_fg.core.errors import InvalidInputError, needed_by
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.records import TrialRecord, TrialStep
 from atg_fg.core.visible_text import visible
@@ -41,13 +41,9 @@ def import_rerun() -> ModuleType:
     Raises:
         MissingDependencyError: It is not installed.
     """
-    try:
+    with needed_by("viewer", "rerun-sdk", "viewer"):
         import rerun
         import rerun.blueprint
-    except ImportError as error:
-        raise MissingDependencyError(
-            'viewer: rerun-sdk is not installed; expected it from: pip install "atg-fg[viewer]"'
-        ) from error
     return rerun  # type: ignore[no-any-return]  # whether it has types depends on whether it is installed
 
 

@@ -8,7 +8,7 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
-from atg_fg.core.errors import MissingDependencyError
+from atg_fg.core.errors import needed_by
 from atg_fg.report.content import Report
 from atg_fg.report.drawn_plot import WIDTH, drawn
 from atg_fg.storage.plain_files import write_bytes_atomically
@@ -58,12 +58,8 @@ def environment() -> Environment:
     Raises:
         MissingDependencyError: Jinja2 is not installed.
     """
-    try:
+    with needed_by("report", "Jinja2", "report"):
         from jinja2 import Environment, PackageLoader, StrictUndefined
-    except ImportError as error:
-        raise MissingDependencyError(
-            'report: Jinja2 is not installed; expected it from: pip install "atg-fg[report]"'
-        ) from error
     loader = PackageLoader("atg_fg.report", "data")
     return Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True)
 

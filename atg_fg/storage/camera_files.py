@@ -44,7 +44,9 @@ def read_calibration(path: Path | str) -> Calibration:
     keys = ("format", "version", "image_size", "intrinsics", "distortion")
     read_object(document, place, keys, ("error_pixels", "pictures"))
     check_format(document, CALIBRATION_FORMAT, place)
-    size = read_list(document["image_size"], f"{place}: image_size", 2)
+    size = read_list(document["image_size"], f"{place}: image_size")
+    if len(size) != 2:
+        raise InvalidInputError(f"{place}: image_size: {size!r}; expected width and height")
     width, height = (whole_number(side, f"{place}: image_size", 1) for side in size)
     with placed(place):
         return Calibration(

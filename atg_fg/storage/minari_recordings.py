@@ -17,7 +17,7 @@ import numpy as np
 from gymnasium import spaces
 
 from atg_fg.core.checks import plain_text
-from atg_fg.core.errors import InvalidInputError, MissingDependencyError
+from atg_fg.core.errors import InvalidInputError, needed_by
 from atg_fg.core.patterns import MISSING, FloatArray
 from atg_fg.core.recordings import RecordedTrial, Recording
 from atg_fg.storage.checked_json import parse_json, read_object, without_none
@@ -139,13 +139,9 @@ def _numbers(metadata: Any, name: str) -> dict[str, Any]:
 
 
 def _minari() -> Any:
-    try:
+    with needed_by("datasets", "Minari, with its storage,", "minari"):
         import h5py  # noqa: F401 - what Minari stores with
         import minari
-    except ImportError as error:
-        raise MissingDependencyError(
-            'Minari: not installed with its storage; expected it from: pip install "atg-fg[minari]"'
-        ) from error
     return minari
 
 

@@ -21,7 +21,7 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from atg_fg.core.checks import brief, plain_text
-from atg_fg.core.errors import AtgError, InvalidInputError, MissingDependencyError
+from atg_fg.core.errors import AtgError, InvalidInputError, needed_by
 from atg_fg.core.recordings import RecordedLook, RecordedTrial, Recording, used_labels
 from atg_fg.storage.checked_json import parse_json, read_object
 from atg_fg.storage.limits import refuse_size, unpacked_limit
@@ -97,13 +97,9 @@ def read_bag(path: Path, topics: BagTopics) -> Recording:
         InvalidInputError: The bag cannot be read, has no such topic, a type that is not known, or no such field.
         MissingDependencyError: `rosbags` is not installed.
     """
-    try:
+    with needed_by("bags", "rosbags", "ros"):
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
-    except ImportError as error:
-        raise MissingDependencyError(
-            'bags: rosbags is not installed; expected it from: pip install "atg-fg[ros]"'
-        ) from error
     with ExitStack() as stack:
         try:
             if not all(os.path.isfile(each) or os.path.isdir(each) for each in _parts_of(path)):

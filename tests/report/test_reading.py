@@ -278,7 +278,7 @@ def test_every_result_of_the_repository_has_a_page():
         (lambda lines: lines[1].pop("entropy"), "line 2: key 'entropy' is missing"),
         (lambda lines: lines[2].update(entropy=True), "line 3: entropy: True; expected a finite number"),
         (lambda lines: lines[2].update(unseen=1.5), "line 3: unseen: 1.5; expected a finite number from 0 to 1"),
-        (lambda lines: lines[1].update(objects=[0.1, 0.2]), "line 2: objects: 2 numbers; expected 1"),
+        (lambda lines: lines[1].update(objects=[0.1, 0.2]), "line 2: objects: 2 entries; expected 1"),
         (lambda lines: lines[1].update(observed=[3, 99]), "line 2: observed"),
         (lambda lines: lines[1].update(observed="front"), "line 2: observed: 'front'; expected a list"),
         (lambda lines: lines[1].update(action="jump"), "line 2: action: 'jump'; expected one of: flip, left, right"),

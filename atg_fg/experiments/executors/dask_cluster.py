@@ -9,7 +9,7 @@ from collections.abc import Callable
 from concurrent.futures import CancelledError, Future, ThreadPoolExecutor
 from typing import Any, Final
 
-from atg_fg.core.errors import InvalidInputError, MissingDependencyError, WorkerLostError
+from atg_fg.core.errors import InvalidInputError, WorkerLostError, needed_by
 from atg_fg.core.version import __version__
 
 #: How long to wait for an answer of the scheduler, and for its first worker, seconds.
@@ -35,7 +35,8 @@ class Cluster:
     slots = sys.maxsize
 
     def __init__(self, address: str) -> None:
-        distributed = _distributed(address)
+        with needed_by(f"executor {address!r}", "dask", "cluster"):
+            import distributed
         self._address = address
         self._killed: type[Exception] = distributed.KilledWorker
         url = address.replace("dask://", "tcp://")
@@ -117,13 +118,3 @@ async def _check_scheduler(distributed: Any, address: str, url: str) -> None:
 
 def _version() -> str:
     return __version__
-
-
-def _distributed(address: str) -> Any:
-    try:
-        import distributed
-    except ImportError as error:
-        raise MissingDependencyError(
-            f'executor {address!r}: dask is not installed; expected it from: pip install "atg-fg[cluster]"'
-        ) from error
-    return distributed
