@@ -1,9 +1,8 @@
-"""The Bayes filter of many hypotheses, each over its own aspects: rows of padded arrays, and lists of counted edges.
+"""The Bayes filter of many hypotheses, each over aspects that the trial has found: padded arrays, and counted edges.
 
-It computes what ``atg_fg.inference.recognition_model`` says, without any table over objects and patterns. A row may
-also have *hidden* aspects: known aspects that nothing in the trial has told apart yet. Their mass is kept as one
-number. What is not known of their edges lies between the two extremes that the row is given
-(``docs/large_memories.md``).
+It computes what ``atg_fg.inference.recognition_model`` says, without any table over objects and patterns. Aspects that
+were known before the trial are *hidden*: nothing in it has told them apart yet. Their mass is kept as one number. What
+is not known of their edges lies between the two extremes that the row is given (``docs/large_memories.md``).
 """
 
 from __future__ import annotations
@@ -14,9 +13,7 @@ import numpy as np
 
 from atg_fg.core.actions import AnyAction, UncertainAction
 from atg_fg.core.assumptions import Assumptions
-from atg_fg.core.compact.columns import positions
-from atg_fg.core.compact.compact_memory import GraphArrays
-from atg_fg.core.log_math import log_of, log_sum_exp
+from atg_fg.core.log_math import log_of
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, FloatArray, IntArray
 from atg_fg.inference.recognition_model import COLLECTION
@@ -48,11 +45,9 @@ class CountedEdges(NamedTuple):
         """Return the entries of both."""
         return CountedEdges(*(np.concatenate(pair) for pair in zip(self, other, strict=True)))
 
-    def in_cells(self, width: int, new_width: int, first_row: int = 0) -> CountedEdges:
-        """Return the same edges where rows are ``new_width`` wide and begin at another one."""
-        if width == new_width and not first_row:
-            return self
-        source, target = ((cells // width + first_row) * new_width + cells % width for cells in self[:2])
+    def in_cells(self, width: int, new_width: int) -> CountedEdges:
+        """Return the same edges where rows are ``new_width`` wide."""
+        source, target = (cells // width * new_width + cells % width for cells in self[:2])
         return CountedEdges(source, target, self.counts, self.probability)
 
 
@@ -71,68 +66,40 @@ class Looked(NamedTuple):
 
 
 class AspectFilter:
-    """R hypotheses, with A actions; state 0 of a row is its collection node, state 1 + k its k-th listed aspect.
+    """R hypotheses, with A actions; state 0 of a row is its collection node, state 1 + k the k-th aspect found.
 
     Args:
         assumptions: |G|, actions and alphabet.
         parameters: α, δ and whether to learn within the trial.
-        graphs: The known aspects and transitions of each row; no aspects where they are hidden.
         log_weight: ln of the prior weight of each row, shape [R].
-        hidden: The hidden aspects of each row, if there are any.
+        hidden: The aspects of each row that were known before the trial.
 
     Attributes:
         n_known: n of each row, the hidden ones included, shape [R].
-        listed_rows: Row of each listed aspect, shape [L].
-        listed_patterns: Pattern of each listed aspect, shape [L].
-        pattern: The same by state, shape [R, W]; −1 for collection nodes and padding.
+        pattern: What each state shows, shape [R, W]; −1 for collection nodes and padding.
         mass: p(X_t | row), shape [R, W].
         hidden_mass: p(X_t is hidden | row), shape [R].
         log_weight: ln p(row, z_0:t), shape [R].
         prior_weight: α/(c + α) of each aspect under each action, shape [A, R, W].
-        edges: The counted transitions by action.
+        edges: The transitions counted in the trial, by action.
     """
 
     def __init__(
-        self,
-        assumptions: Assumptions,
-        parameters: ModelParameters,
-        graphs: GraphArrays,
-        log_weight: FloatArray,
-        hidden: Hidden | None = None,
+        self, assumptions: Assumptions, parameters: ModelParameters, log_weight: FloatArray, hidden: Hidden
     ) -> None:
         self.parameters = parameters
         self.n_patterns = len(assumptions.alphabet)
         self.n_aspects = assumptions.n_aspects
-        n_rows, listed = len(log_weight), graphs.n_known.astype(np.int64)
-        self.hidden = hidden or Hidden(*(np.zeros(n_rows) for _ in range(3)))
-        self.n_known = listed + self.hidden.number.astype(np.int64)
+        n_rows, n_actions = len(log_weight), len(assumptions.actions)
+        self.hidden = hidden
+        self.n_known = hidden.number.astype(np.int64)
         self.log_weight = log_weight
-        width = 1 + int(listed.max(initial=0))
-        self.pattern = np.full((n_rows, width), -1, dtype=np.int32)
-        states = positions(np.arange(n_rows) * width + 1, listed)
-        self.pattern.ravel()[states] = graphs.patterns
-        self.listed_rows = np.repeat(np.arange(n_rows), listed)
-        self.listed_patterns = graphs.patterns.astype(np.int64)
-        self.mass = np.where(self.pattern >= 0, 1.0 / self.n_aspects, 0.0)
-        self.mass[:, COLLECTION] = self.n_unobserved / self.n_aspects
-        self.hidden_mass = self.hidden.number / self.n_aspects
-        self._count_edges(graphs, len(assumptions.actions))
-
-    def _count_edges(self, graphs: GraphArrays, n_actions: int) -> None:
-        alpha, width = self.parameters.transition_concentration, self.width
-        rows = np.repeat(np.arange(self.n_rows), graphs.n_edges.astype(np.int64))
-        source, target = rows * width + graphs.source + 1, rows * width + graphs.target + 1
-        count = graphs.counts.astype(np.float64)
-        self.prior_weight = np.ones((n_actions, self.n_rows, width))
-        self.edges: list[CountedEdges] = []
-        for action in range(n_actions):
-            chosen = np.flatnonzero(graphs.action == action)
-            from_cell, counted = source[chosen], count[chosen]
-            totals = np.bincount(from_cell, counted, self.pattern.size)
-            has = totals > 0
-            self.prior_weight[action].ravel()[has] = alpha / (totals[has] + alpha)
-            probability = counted / (totals[from_cell] + alpha)
-            self.edges.append(CountedEdges(from_cell, target[chosen], counted, probability))
+        self.pattern = np.full((n_rows, 1), -1, dtype=np.int32)
+        self.mass = (self.n_unobserved / self.n_aspects)[:, None]
+        self.hidden_mass = hidden.number / self.n_aspects
+        self.prior_weight = np.ones((n_actions, n_rows, 1))
+        cells, numbers = np.zeros(0, dtype=np.int64), np.zeros(0)
+        self.edges = [CountedEdges(cells, cells, numbers, numbers) for _ in range(n_actions)]
 
     @property
     def n_rows(self) -> int:
@@ -229,8 +196,6 @@ class AspectFilter:
         states = self.n_known[rows] - self.hidden.number[rows].astype(np.int64)
         self._widen(int(states.max()) + 1)
         self.pattern[rows, states] = pattern
-        self.listed_rows = np.append(self.listed_rows, rows)
-        self.listed_patterns = np.append(self.listed_patterns, np.full(len(rows), pattern))
         revealed = self.mass[rows, COLLECTION] * shares
         self.mass[rows, states] = revealed
         self.mass[rows, COLLECTION] -= revealed
@@ -273,33 +238,6 @@ class AspectFilter:
         rows, states = np.nonzero(self.pattern == pattern)
         cells[rows] = rows * self.width + states
         return cells
-
-    def take_in(self, evidence: Evidence, seen: tuple[int | None, int | None, int | None]) -> float:
-        """Take in a look and learn from it; return ln p(one of the rows, z_0:t), or −∞ with nothing changed."""
-        looked = self.looked(evidence)
-        log_total = log_sum_exp(looked.log_weight)
-        if np.isfinite(log_total):
-            self.accept(looked)
-            self.learn(*seen)
-        return log_total
-
-    def rule_out(self) -> None:
-        """Let all rows be impossible from here on."""
-        self.log_weight = np.full_like(self.log_weight, -np.inf)
-
-    def absorb(self, other: AspectFilter) -> None:
-        """Add the rows of a filter that has gone through the same trial."""
-        width = max(self.width, other.width)
-        self._widen(width)
-        other._widen(width)
-        first_row = self.n_rows
-        other.listed_rows = other.listed_rows + first_row
-        for name in ("listed_rows", "listed_patterns", "n_known", "pattern", "mass", "hidden_mass", "log_weight"):
-            setattr(self, name, np.concatenate((getattr(self, name), getattr(other, name))))
-        self.hidden = Hidden(*(np.concatenate(pair) for pair in zip(self.hidden, other.hidden, strict=True)))
-        self.prior_weight = np.concatenate((self.prior_weight, other.prior_weight), axis=1)
-        moved = [edges.in_cells(width, width, first_row) for edges in other.edges]
-        self.edges = [edges.followed_by(more) for edges, more in zip(self.edges, moved, strict=True)]
 
 
 def is_complete(evidence: Evidence) -> bool:

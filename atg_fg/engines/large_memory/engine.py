@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, ClassVar, Final, NamedTuple, Protocol
+from typing import TYPE_CHECKING, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -11,27 +11,19 @@ from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.checks import whole_number
 from atg_fg.core.compact.compact_memory import CompactMemory, GraphArrays
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.core.log_math import log_of, log_sum_exp
+from atg_fg.core.log_math import log_sum_exp
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.patterns import Evidence, FloatArray, IntArray
 from atg_fg.engines.large_memory.aspect_filter import AspectFilter
-from atg_fg.engines.large_memory.decision import (
-    NextLooks,
-    by_class,
-    entropy_bound,
-    expected_entropies,
-    is_decided,
-    one_by_one,
-)
+from atg_fg.engines.large_memory.decision import by_class, entropy_bound, expected_entropies, is_decided
 from atg_fg.engines.large_memory.never_matched import ClassMasses, NeverMatched
 from atg_fg.engines.tables_on_demand import MAX_CELLS, TablesOnDemand
 from atg_fg.inference.chain import build_chain, forward_backward
 from atg_fg.inference.history import History
 from atg_fg.inference.interface import Inference, TrialSetup
-from atg_fg.inference.kernels import compilation
 
-#: So few objects are not worth an approximation.
-FEW: Final = 1000
+if TYPE_CHECKING:
+    from atg_fg.engines.large_memory.matched_rows import MatchedRows
 
 
 class Decision(NamedTuple):
@@ -40,30 +32,6 @@ class Decision(NamedTuple):
     expected: FloatArray
     bound: float
     fell_back: bool
-
-
-class Rows(Protocol):
-    """Objects that are filtered one by one, in NumPy or in compiled loops."""
-
-    @property
-    def mass(self) -> FloatArray:
-        """p(X_t | row), shape [R, W]."""
-
-    @property
-    def log_weight(self) -> FloatArray:
-        """Ln p(row, z_0:t), shape [R]."""
-
-    def predict(self, action: AnyAction) -> None:
-        """Take in an action that is sure, or that nothing happened."""
-
-    def take_in(self, evidence: Evidence, seen: tuple[int | None, int | None, int | None]) -> float:
-        """Take in a look and learn from it; return ln p(one of the rows, z_0:t), or −∞ with nothing changed."""
-
-    def rule_out(self) -> None:
-        """Let all rows be impossible from here on."""
-
-    def absorb(self, other: Any) -> None:
-        """Add the rows of a filter of this kind that has gone through the same trial."""
 
 
 class LargeMemory(Inference):
@@ -109,7 +77,7 @@ class LargeMemory(Inference):
         self._compact = CompactMemory.of(self.memory)
         self._log_total = 0.0
         self._decision: Decision | None = None
-        self._all: Rows | None = None
+        self._all: MatchedRows | None = None
         self._n_followed = 0
         self._classes: NeverMatched | None = None
         #: index of the object in each row of ``_matched`` but the first, which is *unseen*
@@ -127,7 +95,7 @@ class LargeMemory(Inference):
         """Return the tables in force when the trial begins."""
         return TablesOnDemand(self.memory, self.parameters, self.prior, max_cells=MAX_CELLS)
 
-    def _filter_of(self, objects: IntArray, *, unseen: bool = False) -> Rows:
+    def _filter_of(self, objects: IntArray, *, unseen: bool = False) -> MatchedRows:
         """Return a filter of some objects, and of *unseen* before them, at the beginning of the trial."""
         graphs = self._compact.arrays(objects)
         chosen = objects
@@ -136,13 +104,11 @@ class LargeMemory(Inference):
             n_known, n_edges = (np.append(0, part).astype(np.int64) for part in (graphs.n_known, graphs.n_edges))
             graphs = GraphArrays(n_known, graphs.patterns, n_edges, *graphs[3:])
         prior = self.model.prior[chosen]
-        if not compilation.are_wanted():
-            return AspectFilter(self.memory.assumptions, self.parameters, graphs, log_of(prior))
         from atg_fg.engines.large_memory.matched_rows import MatchedRows  # it loads Numba
 
         return MatchedRows(self.memory.assumptions, self.parameters, graphs, prior)
 
-    def _filters(self) -> list[Rows]:
+    def _filters(self) -> list[MatchedRows | AspectFilter]:
         return [self._matched] if self._classes is None else [self._matched, self._classes.filter]
 
     def update(self, evidence: Evidence) -> None:
@@ -265,22 +231,19 @@ class LargeMemory(Inference):
         classes, n_unseen = self._classes, self.model.n_unseen
         unseen = float(weights[0])
         if classes is None:
-            parts = [_next_looks(self._matched, weights, exact=True)]
+            parts = [self._matched.next_looks(weights)]
             return Decision(expected_entropies(parts, unseen, n_unseen), 0.0, fell_back=False)
-        of_classes = by_class(classes, self._masses())
-        is_quick = len(weights) <= FEW or not isinstance(self._matched, AspectFilter)
-        for exact in (True,) if is_quick else (False, True):
-            parts = [_next_looks(self._matched, weights, exact=exact), of_classes]
-            expected = expected_entropies(parts, unseen, n_unseen)
-            bound = entropy_bound(sum(part.unsure for part in parts), len(self._compact) + n_unseen)
-            if is_decided(expected, bound):
-                return Decision(expected, bound, fell_back=False)
+        parts = [self._matched.next_looks(weights), by_class(classes, self._masses())]
+        expected = expected_entropies(parts, unseen, n_unseen)
+        bound = entropy_bound(sum(part.unsure for part in parts), len(self._compact) + n_unseen)
+        if is_decided(expected, bound):
+            return Decision(expected, bound, fell_back=False)
         everything = self._filter_of_all()
         weights = np.exp(everything.log_weight - log_sum_exp(everything.log_weight))
-        parts = [_next_looks(everything, weights, exact=True)]
+        parts = [everything.next_looks(weights)]
         return Decision(expected_entropies(parts, float(weights[0]), n_unseen), 0.0, fell_back=True)
 
-    def _filter_of_all(self) -> Rows:
+    def _filter_of_all(self) -> MatchedRows:
         """Return the exact filter of all objects after the last look; it is kept, and goes on from where it was."""
         if self._all is None:
             self._all = self._filter_of(np.arange(len(self._compact)), unseen=True)
@@ -315,7 +278,7 @@ class LargeMemory(Inference):
         return forward_backward(build_chain(alone, self.parameters, self.history, [0]))
 
 
-def _follow(rows: Rows, history: History, since: int = 0, until: int | None = None) -> None:
+def _follow(rows: MatchedRows, history: History, since: int = 0, until: int | None = None) -> None:
     """Take a filter through a trial from after its first ``since`` looks to its end, or to before a look."""
     end = len(history.evidence) if until is None else until
     for time in range(since, end):
@@ -325,14 +288,3 @@ def _follow(rows: Rows, history: History, since: int = 0, until: int | None = No
             rows.rule_out()
     if 0 < end <= len(history.actions):
         rows.predict(history.actions[end - 1])
-
-
-def _next_looks(rows: Rows, weights: FloatArray, *, exact: bool) -> NextLooks:
-    """Return the next looks of objects one by one; compiled loops follow all edges as quickly as a few."""
-    if isinstance(rows, AspectFilter):
-        return one_by_one(rows, weights, exact=exact)
-    from atg_fg.engines.large_memory.matched_rows import MatchedRows  # it loads Numba
-
-    assert isinstance(rows, MatchedRows)
-    predictive, terms = rows.next_looks(weights)
-    return NextLooks(predictive, terms, 0.0)

@@ -1,7 +1,4 @@
-"""The objects that matched, one by one, in compiled loops: what ``AspectFilter`` computes without hidden aspects.
-
-This module loads Numba.
-"""
+"""The objects that matched, one by one, in compiled loops. This module loads Numba."""
 
 from __future__ import annotations
 
@@ -14,6 +11,7 @@ from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.compact.compact_memory import GraphArrays
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, FloatArray
+from atg_fg.engines.large_memory.decision import NextLooks
 from atg_fg.inference.kernels import decision_kernels
 from atg_fg.inference.kernels import table_kernels as kernels
 from atg_fg.inference.kernels.compiled_filter import CompiledRows, LookedAt
@@ -95,8 +93,8 @@ class MatchedRows(CompiledRows):
         self._shown_pattern = max(self._shown_pattern, other._shown_pattern)
         self.identity = np.exp(self.log_identity)
 
-    def next_looks(self, weights: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return Σ_i J and Σ_i Σ_z J ln J for J = p(O = i, z | a), shapes [A, |𝒵|] and [A].
+    def next_looks(self, weights: FloatArray) -> NextLooks:
+        """Return what may be seen after each action, exactly.
 
         Args:
             weights: p(O | z_0:t) of each row, shape [R].
@@ -104,4 +102,4 @@ class MatchedRows(CompiledRows):
         self._move()
         predictive, terms = np.empty((self._n_actions, self._n_patterns)), np.empty(self._n_actions)
         decision_kernels.next_looks(self._arrays, self._constants, self._aspects, weights, predictive, terms)
-        return predictive, terms
+        return NextLooks(predictive, terms, 0.0)

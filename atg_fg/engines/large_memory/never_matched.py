@@ -63,10 +63,8 @@ class NeverMatched:
         number = np.tile(sizes, 2).astype(np.float64)
         upper = np.repeat((True, False), n_classes)
         hidden = Hidden(number, upper.astype(np.float64), np.where(upper, 1.0, number / n_aspects))
-        none = np.zeros(0, dtype=np.int64)
-        unlisted = GraphArrays(np.zeros(2 * n_classes, dtype=np.int64), none, np.zeros_like(number), *[none] * 4)
         log_weight = np.full(2 * n_classes, log_prior)
-        self.filter = AspectFilter(memory.assumptions, parameters, unlisted, log_weight, hidden)
+        self.filter = AspectFilter(memory.assumptions, parameters, log_weight, hidden)
 
     @property
     def n_classes(self) -> int:

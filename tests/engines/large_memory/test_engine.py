@@ -21,7 +21,6 @@ from atg_fg.engines.large_memory.engine import LargeMemory
 from atg_fg.engines.large_memory.matched_rows import MatchedRows
 from atg_fg.experiments.engine_comparison import total_variation
 from atg_fg.inference.expected_entropy import best_actions
-from atg_fg.inference.kernels import compilation
 from tests.models import Case, Look, cases, random_case
 from tests.oracle import Atg
 from tests.small import graph, one_slot, seen
@@ -91,18 +90,13 @@ def follow_both(case: Case, **options: Any) -> list[tuple[LargeMemory, Any]]:
 
 
 @settings(max_examples=3 * settings.default.max_examples)
-@given(case=cases(), n_exact=st.sampled_from((0, 100)), kernels=st.sampled_from("01"))
-def test_no_random_model_is_further_off_than_the_bound_and_all_decisions_are_the_same(
-    case: Case, n_exact: int, kernels: str
-) -> None:
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setenv(compilation.SWITCH, kernels)
-        follow_both(case, n_exact=n_exact)
+@given(case=cases(), n_exact=st.sampled_from((0, 100)))
+def test_no_random_model_is_further_off_than_the_bound_and_all_decisions_are_the_same(case: Case, n_exact: int) -> None:
+    follow_both(case, n_exact=n_exact)
 
 
 @pytest.mark.parametrize("chunk", range(4))
-def test_memories_in_which_most_objects_never_match_keep_the_bound(chunk: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setenv(compilation.SWITCH, str(chunk % 2))
+def test_memories_in_which_most_objects_never_match_keep_the_bound(chunk: int) -> None:
     bounds, some_fell_back, some_did_not = [], False, False
     for seed in range(chunk * 40, (chunk + 1) * 40):
         ((tried, _),) = follow_both(many_objects(seed), n_exact=0)
@@ -237,13 +231,9 @@ def test_an_option_with_a_bad_value_is_refused(n_exact: object) -> None:
         begin_trial("large-memory", RobotMemory(WORLD), ModelParameters(), n_exact=n_exact)
 
 
-@pytest.mark.parametrize("kernels", ["0", "1"])
 @pytest.mark.parametrize("n_exact", [0, 100])
-def test_a_look_costs_as_much_late_in_a_trial_as_early(
-    n_exact: int, kernels: str, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_look_costs_as_much_late_in_a_trial_as_early(n_exact: int, monkeypatch: pytest.MonkeyPatch) -> None:
     """Only objects that match for the first time are taken through the trial again, and here all match at once."""
-    monkeypatch.setenv(compilation.SWITCH, kernels)
     graphs = [graph(WORLD, str(i), [(i,), (11,)], (0, 0, 1, 2), (1, 1, 0, 1)) for i in range(5)]
     inference = begin_trial("large-memory", RobotMemory(WORLD, graphs), ModelParameters(0.1, 0.1), n_exact=n_exact)
     steps = [0]
