@@ -53,7 +53,7 @@ def changed(document, path, value):
         (("projection", 0), [1.0], r"projection\[0\]: 1 entries; expected 2"),
         (("features",), "", "features: ''; expected a text"),
         (("trials", 0, "readings", 0), [None], r"trials\[0\].readings\[0\]: 1 entries; expected 2"),
-        (("trials", 0, "readings", 0, 0), [1.0], r"readings\[0\]\[0\]: 1 numbers; expected 2"),
+        (("trials", 0, "readings", 0, 0), [1.0], r"readings\[0\]\[0\]: 1 entries; expected 2"),
         (("trials", 0, "readings"), [], r"trials\[0\].readings: 0 looks, 1 actions; expected one look more"),
         (("trials", 0, "classes", 0), [0, 0], r"classes\[0\]: a class where nothing was measured"),
         (("trials", 0, "classes", 0), [9, None], "symbol 9; expected 0 to 5"),
