@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.inference.kernels.compilation import compiled, compiled_within
+from atg_fg.inference.kernels.compilation import NONE, compiled, compiled_within, written_out
 from atg_fg.learning.kernels import (
     Clusters,
     TrialArrays,
@@ -36,7 +36,7 @@ def take_out(trials: TrialArrays, trial: int, clusters: Clusters, path: IntArray
         clusters.owner[trial] = -1
         if clusters.n_trials[cluster] > 0:
             learn_again(trials, clusters, cluster, path)
-    n_clusters, free = 0, -1
+    n_clusters, free = 0, NONE
     for other in range(len(clusters.n_trials)):
         if clusters.n_trials[other] > 0:
             n_clusters += 1
@@ -57,7 +57,7 @@ def log_total(logarithms: FloatArray) -> float:
     return float(peak + np.log(total)) if total > 0 else float(peak)
 
 
-@compiled
+@written_out
 def trial_move(
     trials: TrialArrays,
     trial: int,
@@ -113,7 +113,7 @@ def sharing(clusters: Clusters) -> float:
     return (n_sharing + 1.0) / (n_objects + 2.0)
 
 
-@compiled_within
+@written_out
 def begin_own(trials: TrialArrays, trial: int, clusters: Clusters, free: int, rng: np.random.Generator) -> None:
     """Let a trial be the first of an object with an automaton of its own, which is annealed on it."""
     own = 1 + free

@@ -12,7 +12,7 @@ import numpy as np
 
 from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.inference.kernels.belief_kernels import BEGIN, step
-from atg_fg.inference.kernels.compilation import compiled
+from atg_fg.inference.kernels.compilation import NONE, compiled
 from atg_fg.inference.kernels.table_kernels import weigh_all
 
 
@@ -44,7 +44,7 @@ def log_evidence_of_each(
         constants = (sizes[0], sizes[1], grid[number, 0], grid[number, 1])
         weigh_all(own, constants[2])
         log_identity[:] = 0.0
-        total, shown, shown_pattern = 0.0, np.zeros_like(n_known), -1
+        total, shown, shown_pattern = 0.0, np.zeros_like(n_known), NONE
         for time in range(len(evidence)):
             action = actions[time - 1] if time > 0 else BEGIN
             counted_from = patterns[time - 1] if time > 0 else -1

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.inference.kernels.compilation import compiled, compiled_within
+from atg_fg.inference.kernels.compilation import compiled, compiled_within, written_out
 from atg_fg.learning.gibbs_kernels import count_votes, put_in, take_out
 from atg_fg.learning.kernels import Clusters, TrialArrays, copy_into, draw_by_logarithm, walk
 from atg_fg.learning.object_kernels import cluster_weights
@@ -87,7 +87,7 @@ def settle(
             copy_into(trials.looks[trial, time], looks[trial, time])
 
 
-@compiled
+@written_out
 def judged_move(
     trials: TrialArrays,
     looks: FloatArray,

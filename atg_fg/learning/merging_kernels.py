@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from atg_fg.core.patterns import IntArray
-from atg_fg.inference.kernels.compilation import compiled, compiled_within
+from atg_fg.inference.kernels.compilation import NONE, compiled, compiled_within, written_out
 
 #: Looks that one integer has a bit for.
 _BITS = 62
@@ -69,7 +69,7 @@ def add(automaton: Automaton, mode: int, place: int, look: int) -> int:
     return state
 
 
-@compiled
+@compiled_within
 def note(automaton: Automaton, state: int, change: int) -> None:
     """Note a change, so that it can be undone."""
     number = automaton.counts[_CHANGES]
@@ -125,7 +125,7 @@ def unite(automaton: Automaton, one: int, two: int, to_do: IntArray) -> bool:
     return True
 
 
-@compiled
+@compiled_within
 def link(automaton: Automaton, state: int, edge: int, target: int, to_do: IntArray) -> bool:
     """Let an edge lead to a state, which becomes one with where it led so far; return as ``unite`` does."""
     known = root(automaton.parent, state)
@@ -190,7 +190,7 @@ def insert(
             symbol = symbols[first, slot]
             if has(symbols[:first], symbol):
                 continue  # it has been followed
-            now, previous, before = mode, -1, -1
+            now, previous, before = mode, NONE, NONE
             for time in range(n_looks):
                 if time > 0:
                     before, now = now, next_modes[now, actions[time - 1]]
@@ -212,7 +212,7 @@ def insert(
     return True
 
 
-@compiled_within
+@written_out
 def merge_hidden(automaton: Automaton, n_slots: int, most: int, to_do: IntArray) -> bool:
     """Merge states out of view while they do not contradict; return whether they are no more than can be tried.
 
@@ -229,7 +229,7 @@ def merge_hidden(automaton: Automaton, n_slots: int, most: int, to_do: IntArray)
         return False
     refused = np.zeros((n_hidden, n_hidden), np.bool_)
     while True:
-        chosen, other, best_left, best_seen = -1, -1, 0, 0
+        chosen, other, best_left, best_seen = NONE, NONE, 0, 0
         for first in range(n_hidden):
             one = hidden[first]
             for second in range(first + 1, n_hidden):
@@ -293,13 +293,13 @@ def merge(
     to_do = np.empty((size * n_edges + 1, 2), np.int64)
     for mode in range(n_modes):
         for slot in range(n_slots):
-            add(automaton, mode, slot, -1)
+            add(automaton, mode, slot, NONE)
     n_taken, n_looks = 0, 0
     for number in range(n_trials):
         length = lengths[number]
         trial = (symbols[number, :length], actions[number])
         n_added, n_left = automaton.counts[_ADDED], automaton.counts[_LEFT]
-        chosen, fewest = -1, 0
+        chosen, fewest = NONE, 0
         for mode in range(n_modes):
             fits = insert(automaton, next_modes, trial, mode, n_looks, to_do)
             if fits and (chosen < 0 or automaton.counts[_LEFT] < fewest):

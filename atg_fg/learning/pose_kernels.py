@@ -6,6 +6,7 @@ import numpy as np
 
 from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.inference.kernels.compilation import compiled, compiled_within
+from atg_fg.learning.kernels import copy_into
 from atg_fg.learning.register_contents import SAME, TINY
 
 #: Rows less probable than this are dropped.
@@ -140,7 +141,7 @@ def reveal(
         if truth[row] <= SAME:
             continue
         table, is_known = tables[n_changed], True
-        table[:] = contents[of_row[row]]
+        copy_into(table, contents[of_row[row]])
         for slot in range(seen.shape[1]):
             # What shows nothing but what is known for certain leaves a table as it is.
             is_known = is_known and table[registers[pose[row], slot], seen[owner[row], slot]] > 1.0 - SAME
@@ -184,14 +185,15 @@ def merged(
     n_starts, n_poses = sizes
     n_rows, n_old, n_new = len(owner), len(contents), 0
     everything = np.empty((n_old + len(tables), contents.shape[1], contents.shape[2]))
-    everything[:n_old] = contents
-    everything[n_old:] = tables
-    table, key = of_row.copy(), np.empty(n_rows, np.int64)
+    for each in range(len(everything)):
+        copy_into(everything[each], contents[each] if each < n_old else tables[each - n_old])
+    table, key, n_owners = of_row.copy(), np.empty(n_rows, np.int64), 0
     for index in range(len(changed)):
         table[changed[index]] = n_old + index
     for row in range(n_rows):
         key[row] = (owner[row] * n_starts + start[row]) * n_poses + pose[row]
-    order = np.argsort(key, kind="mergesort")
+        n_owners = max(n_owners, owner[row] + 1)
+    order = in_order(owner, n_owners, in_order(start, n_starts, in_order(pose, n_poses, np.arange(n_rows))))
     begins, weights, numbers = np.empty(n_rows, np.int64), np.zeros(n_rows), np.empty(n_rows, np.int64)
     last = np.empty(n_rows, np.int64)
     expected, is_used, n_mixed = np.zeros((n_rows, events.shape[1])), np.zeros(len(everything), np.bool_), 0
@@ -240,6 +242,23 @@ def merged(
     last = last[:n_new]
     kept = (owner[last], start[last], pose[last], weights[:n_new], numbers[:n_new], expected[:n_new])
     return kept, (left, shown_left)
+
+
+@compiled_within
+def in_order(numbers: IntArray, n_numbers: int, order: IntArray) -> IntArray:
+    """Return an order of rows by numbers below a limit, and where these are equal, as before.
+
+    ``np.argsort`` takes seconds to compile.
+    """
+    places, result = np.zeros(n_numbers + 1, np.int64), np.empty_like(order)
+    for row in range(len(order)):
+        places[numbers[row] + 1] += 1
+    for number in range(n_numbers):
+        places[number + 1] += places[number]
+    for row in order:
+        result[places[numbers[row]]] = row
+        places[numbers[row]] += 1
+    return result
 
 
 @compiled_within
@@ -305,7 +324,8 @@ def follow(
         wrong_look = np.full(len(log_evidence), wrong_pattern)
         kept, truth, weight = weigh(owner, weight, ((1.0 - wrong) * probability, wrong_look), log_evidence, log_weights)
         rows = (owner[kept], start[kept], pose[kept], weight, table[kept], events[kept])
-        rows[5][:, 1] += 1.0 - truth
+        for row in range(len(truth)):
+            rows[5][row, 1] += 1.0 - truth[row]
         tables, changed = reveal(rows, known, registers, seen[look], truth, repeat)
         rows, known = merged(rows, known, tables, changed, (n_starts, len(registers)), repeat)
     return rows, known
@@ -316,11 +336,10 @@ def act(rows: Rows, successors: IntArray, actions: IntArray, slip: float) -> Row
     """Move each row by the action of its owner, and leave a second one behind for a slip, after all that moved."""
     owner, start, pose, weight, table, events = rows
     n_rows = len(owner)
-    moved = pose.copy()
+    moved, stayed = pose.copy(), events.copy()
     for row in range(n_rows):
         moved[row] = successors[pose[row], actions[owner[row]]]
-    stayed = events.copy()
-    stayed[:, 0] += 1.0
+        stayed[row, 0] += 1.0
     return (
         np.concatenate((owner, owner)),
         np.concatenate((start, start)),

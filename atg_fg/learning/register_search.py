@@ -45,6 +45,7 @@ def search_registers(
     n_symbols = trials.looks.shape[-1]
     prior = np.full(n_symbols, 1.0 / n_symbols)
     newest = slice(max(len(plain) - N_TRIALS, 0), None)
+    rest = np.ascontiguousarray(plain[newest])
     window = TrialArrays(trials.looks[newest], trials.actions[newest], trials.lengths[newest])
     found: list[SharedStructure] = []
     for n_registers in range(n_slots, n_slots + MAX_HIDDEN + 1):
@@ -52,19 +53,19 @@ def search_registers(
         for _ in range(n_chains):
             sources = np.array([rng.permutation(n_registers) for _ in range(n_actions)])
             coldness = np.geomspace(HOTTEST, 1.0, N_SWEEPS)
-            score = map_kernels.anneal_maps(window, plain[newest], sources, n_slots, prior, coldness, False, 0.0, rng)
+            score = map_kernels.anneal_maps(window, rest, sources, n_slots, prior, coldness, False, 0.0, rng)
             found.append(_structure(n_slots, sources))
             if score > best:
                 best, best_sources = score, sources
         permutation, other = log_map_priors(n_registers)
         sources, coldness = best_sources.copy(), np.geomspace(HOTTEST_COPYING, 1.0, N_COPYING_SWEEPS)
         cost = permutation - other
-        map_kernels.anneal_maps(window, plain[newest], sources, n_slots, prior, coldness, True, cost, rng)
+        map_kernels.anneal_maps(window, rest, sources, n_slots, prior, coldness, True, cost, rng)
         found.append(_structure(n_slots, sources))
 
     def score_of(structure: SharedStructure) -> float:
         sources = np.array(structure.sources)
-        evidence = map_kernels.map_log_evidence(window, plain[newest], sources, n_slots, prior)
+        evidence = map_kernels.map_log_evidence(window, rest, sources, n_slots, prior)
         return float(evidence) + structure.log_prior
 
     return sorted(dict.fromkeys(found), key=score_of, reverse=True)

@@ -120,7 +120,7 @@ def test_a_trial_move_draws_from_the_conditional_distribution():
     votes = np.zeros(len(chain.clusters.n_trials) + 1)
     rng, counts = np.random.default_rng(5), np.zeros((2, 3))
     for _ in range(4000):
-        gibbs_kernels.trial_move(trials, 0, chain.clusters, task.log_new, np.zeros(0), 1.0, rng, votes)
+        gibbs_kernels.sweep(trials, np.array([0]), chain.clusters, task.log_new, np.zeros(0), 1.0, rng, votes)
         counts[int(chain.clusters.owner[0] != 1), chain.clusters.start[0]] += 1
     assert votes[1] / 4000 == pytest.approx(expected[0].sum(), abs=1e-12)
     assert votes[-1] / 4000 == pytest.approx(expected[1].sum(), abs=1e-12)

@@ -103,7 +103,7 @@ def test_a_judged_move_leaves_the_distribution_of_object_start_and_judgements_as
     rng, n_rounds, found = np.random.default_rng(6), 40_000, dict.fromkeys(expected, 0)
     votes, each_slot = np.zeros(len(clusters.n_trials) + 1), TrialArrays(right, trials.actions, trials.lengths)
     for _ in range(n_rounds):
-        look_kernels.judged_move(trials, right, each_slot, 2, clusters, log_new, RATE, wrong, rng, votes)
+        look_kernels.judged_sweep(trials, right, each_slot, np.array([2]), clusters, log_new, RATE, wrong, rng, votes)
         place = (int(clusters.owner[2] != 0), int(clusters.start[2]), tuple(wrong[2].tolist()))
         found[place] += 1
     # Rounds depend on each other: the bound allows for some ten rounds of memory.

@@ -16,7 +16,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from atg_fg.core.patterns import FloatArray
-from atg_fg.inference.kernels.compilation import compiled
+from atg_fg.inference.kernels.compilation import NONE, compiled, compiled_within
 from atg_fg.inference.kernels.table_kernels import SmallIntArray, count, weigh
 
 #: In place of an action: nothing happened, or the trial begins.
@@ -63,7 +63,7 @@ def move(tables: tuple[Any, ...], constants: tuple[Any, ...], aspects: FloatArra
             aspects[hypothesis, edges[edge, 0]] += scratch[edge - first]
 
 
-@compiled
+@compiled_within
 def _kept(aspects: FloatArray, edges: SmallIntArray, counted: FloatArray, concentration: float) -> float:
     """Return Σ_x p(x | O) α / (c + α) of one hypothesis and action, a sum of what may be very small."""
     totals = np.zeros(len(aspects))
@@ -106,7 +106,7 @@ def step(
     n_hypotheses = len(n_known)
     if action != REST:
         move(tables, constants, aspects, action)
-    allowed, weight, whole = 0, 0.0, -1
+    allowed, weight, whole = 0, 0.0, NONE
     for each in range(n_patterns):
         if evidence[each] != 0.0:
             weight += evidence[each]
@@ -116,7 +116,7 @@ def step(
     if allowed == 1:
         _explain_one(tables, constants, aspects, whole, weight, (totals, rates), states)
     else:
-        whole = -1
+        whole = NONE
         _explain(tables, constants, aspects, evidence, (totals, rates))
     peak = -np.inf
     for hypothesis in range(n_hypotheses):
@@ -152,7 +152,7 @@ def step(
     return float(log_probability)
 
 
-@compiled
+@compiled_within
 def _learn(
     tables: tuple[Any, ...],
     constants: tuple[Any, ...],
@@ -191,7 +191,7 @@ def _learn(
         shown[hypothesis] = target
 
 
-@compiled
+@compiled_within
 def _state_showing(patterns: SmallIntArray, hypothesis: int, n_own: int, wanted: int) -> int:
     """Return which state of a hypothesis shows a pattern, 0 if none does."""
     found = 0
@@ -201,7 +201,7 @@ def _state_showing(patterns: SmallIntArray, hypothesis: int, n_own: int, wanted:
     return found
 
 
-@compiled
+@compiled_within
 def _explain_one(
     tables: tuple[Any, ...],
     constants: tuple[Any, ...],
@@ -227,7 +227,7 @@ def _explain_one(
         states[hypothesis], totals[hypothesis], rates[hypothesis] = state, total, rate
 
 
-@compiled
+@compiled_within
 def _explain(
     tables: tuple[Any, ...],
     constants: tuple[Any, ...],

@@ -8,12 +8,20 @@ from functools import cache
 from importlib.util import find_spec
 from typing import Any, Final, TypeVar
 
+import numpy as np
+
 from atg_fg.core.errors import MissingDependencyError
 
 _Function = TypeVar("_Function", bound=Callable[..., Any])
 
 #: Environment variable that turns compiled filters off when it is ``0``: NumPy then computes what they would.
 SWITCH: Final = "ATG_FG_KERNELS"
+
+#: −1 for no index in a compiled function. The literal has a type of its own, for which callees are compiled once more.
+NONE: Final[Any] = np.int64(-1)
+
+#: No one calls by a pointer what is compiled: a function for that would have to be compiled, too.
+_OPTIONS: Final = {"cache": True, "error_model": "numpy", "no_cfunc_wrapper": True}
 
 _tell: Callable[[], None] | None = None
 
@@ -40,7 +48,7 @@ def compiled(function: _Function) -> _Function:
     Raises:
         MissingDependencyError: Numba is not installed.
     """
-    result: _Function = _numba().njit(cache=True, error_model="numpy")(function)
+    result: _Function = _numba().njit(**_OPTIONS)(function)
     return result
 
 
@@ -52,8 +60,19 @@ def compiled_within(function: _Function) -> _Function:
     Raises:
         MissingDependencyError: Numba is not installed.
     """
-    options = {"cache": True, "error_model": "numpy", "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
-    result: _Function = _numba().njit(**options)(function)
+    result: _Function = _numba().njit(no_cpython_wrapper=True, **_OPTIONS)(function)
+    return result
+
+
+def written_out(function: _Function) -> _Function:
+    """Have Numba take the lines of a function into the compiled one that calls it, in place of compiling it by itself.
+
+    It is for long functions with one caller: what a function calls is compiled once more with each that calls it.
+
+    Raises:
+        MissingDependencyError: Numba is not installed.
+    """
+    result: _Function = _numba().njit(inline="always", **_OPTIONS)(function)
     return result
 
 
@@ -67,8 +86,7 @@ def reordered(function: _Function) -> _Function:
 
     It may then take several at once, which a check for division by zero would forbid.
     """
-    options = {"cache": True, "error_model": "numpy", "fastmath": {"reassoc", "contract"}}
-    result: _Function = _numba().njit(**options)(function)
+    result: _Function = _numba().njit(fastmath={"reassoc", "contract"}, **_OPTIONS)(function)
     return result
 
 

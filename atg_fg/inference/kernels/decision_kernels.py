@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.inference.kernels.compilation import compiled, reordered
+from atg_fg.inference.kernels.compilation import compiled, compiled_within, reordered
 
 #: Smallest normal number, in place of zero under a logarithm: x ln x of what is below it is zero up to rounding.
 _LEAST: Final = float(np.finfo(np.float64).tiny)
@@ -76,7 +76,7 @@ def _weighted_sum_x_log_x(values: FloatArray, weights: FloatArray) -> float:
     return total
 
 
-@compiled
+@compiled_within
 def _add_others(terms: FloatArray, others: FloatArray, factors: FloatArray, n_others: int) -> None:
     """Add Σ factor · x ln x of the first values in the block of each action to its term."""
     for action in range(len(terms)):
@@ -84,7 +84,7 @@ def _add_others(terms: FloatArray, others: FloatArray, factors: FloatArray, n_ot
         terms[action] += _weighted_sum_x_log_x(others[begin:end], factors[begin:end])
 
 
-@compiled
+@compiled_within
 def _add_reached(terms: FloatArray, reached: FloatArray, n_reached: IntArray, n_next: int) -> tuple[FloatArray, int]:
     """Add Σ x ln x of the values of each action to its term; return empty blocks with room for more, and their size."""
     block = len(reached) // len(terms)

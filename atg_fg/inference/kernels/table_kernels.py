@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from numpy.typing import NDArray
 
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.inference.kernels.compilation import compiled
+from atg_fg.inference.kernels.compilation import compiled, compiled_within
 
 #: Of few bytes; which type it is depends on the sizes.
 SmallIntArray = NDArray[Any]
@@ -89,7 +89,7 @@ def write_rows(
         aspect, row, first = last_aspect, last_row, first + n_counts[hypothesis] + room
 
 
-@compiled
+@compiled_within
 def weigh_all(tables: tuple[Any, ...], concentration: float) -> None:
     """Set the probabilities of the edges in all rows of all hypotheses, from their counts."""
     _, _, begins, edges, counted, probability = tables
@@ -97,7 +97,7 @@ def weigh_all(tables: tuple[Any, ...], concentration: float) -> None:
         _weigh_own(edges, counted, probability, begins, hypothesis, concentration)
 
 
-@compiled
+@compiled_within
 def _weigh_own(
     edges: SmallIntArray,
     counted: FloatArray,
@@ -111,7 +111,7 @@ def _weigh_own(
             weigh(edges, counted, probability, begins, hypothesis, edges[edge, 1], action, concentration)
 
 
-@compiled
+@compiled_within
 def weigh(
     edges: SmallIntArray,
     counted: FloatArray,
@@ -132,7 +132,7 @@ def weigh(
             probability[edge] = counted[edge] / total
 
 
-@compiled
+@compiled_within
 def count(
     edges: SmallIntArray,
     counted: FloatArray,
