@@ -61,7 +61,8 @@ def histories_of(looks: FloatArray, n_slots: int, prior: FloatArray) -> Historie
     longer, product = np.empty((capacity, n_rows), np.uint32), np.empty((capacity, n_symbols))
     log_evidence, n_known = np.zeros(capacity), np.ones(1, np.uint32)
     longer[0] = 0
-    product[0] = prior
+    for symbol in range(n_symbols):
+        product[0, symbol] = prior[symbol]
     return number, rows, longer, product, log_evidence, n_known
 
 

@@ -221,9 +221,10 @@ def merged(
     shown_left = np.empty_like(left)
     for old in range(len(everything)):
         if is_used[old]:
-            left[n_left], number[old] = everything[old], n_left
+            number[old] = n_left
+            copy_into(left[n_left], everything[old])
             if old < n_old:
-                shown_left[n_left] = shown[old]
+                copy_into(shown_left[n_left], shown[old])
             else:
                 show(everything[old], repeat, shown_left[n_left])
             n_left += 1
