@@ -7,11 +7,12 @@ import numpy as np
 import pytest
 
 from atg_fg.learning.candidate import Candidate
-from atg_fg.learning.kinds import N_PLAIN, PLAIN_BEFORE, choose_kinds, kind_table, share_kinds
+from atg_fg.learning.kinds import MAX_KINDS, N_PLAIN, PLAIN_BEFORE, choose_kinds, kind_table, share_kinds
 from atg_fg.learning.plain_evidence import USUAL, PlainEvidence
-from atg_fg.learning.pose_filter import WRONG
+from atg_fg.learning.pose_filter import SLIP, WRONG
 from atg_fg.learning.rates import Rates
 from atg_fg.learning.raw_trials import RawTrial
+from atg_fg.learning.shared_structure import SharedStructure
 from tests.learning.worlds import ARCUBES, CUBE, PRISM, cubes, prisms, random_objects, trial_of
 
 
@@ -101,3 +102,60 @@ def test_sets_that_explain_nearly_as_much_are_believed_in_too():
     sets = choose_kinds(pool, plain, trials)
     assert {each.structures for each in sets} == {(0,), ()}
     assert sets[0].log_evidence >= sets[1].log_evidence > sets[0].log_evidence - 7
+
+
+def pool_of(tables, structures, wrong=None):
+    """Structures that explain trials of eleven looks as they are told to, none of them in another way."""
+    pool = [Candidate(structure, ARCUBES.alphabet) for structure in structures]
+    for number, (each, log_evidence) in enumerate(zip(pool, tables, strict=True)):
+        each.log_evidence, each.events = np.array(log_evidence, dtype=float), np.zeros((len(log_evidence), 4))
+        if wrong is not None:
+            each.events[:, WRONG] = wrong[number]
+    return pool, [RawTrial(((0, 1),) * 11, (0,) * 10)] * len(tables[0])
+
+
+def wide(*n_registers):
+    """Structures of so many registers, which are ever less probable beforehand."""
+    return [SharedStructure(2, (tuple(range(n)),)) for n in n_registers]
+
+
+@pytest.mark.parametrize("seed", [0, 2, 3, 34])
+def test_the_best_set_of_kinds_is_the_best_of_all_sets(seed):
+    rng = np.random.default_rng(seed)
+    structures, n = wide(2, 3, 4, 5, 6, 7), 12
+    plain = np.column_stack((rng.normal(-30, 3, n), np.full(n, -40.0)))
+    explained, wrong = rng.random((6, n)) < 0.45, np.where(rng.random((6, n)) < 0.15, 1.0, 0.0)
+    pool, trials = pool_of(np.where(explained, rng.normal(-20, 4, (6, n)), -70.0), structures, wrong)
+    table, evidence = kind_table(pool, plain, trials), {}
+    for chosen in itertools.chain.from_iterable(
+        itertools.combinations(range(6), size) for size in range(MAX_KINDS + 1)
+    ):
+        shares = share_kinds(table[:, [0, 1, *(N_PLAIN + number for number in chosen)]])
+        of = shares.responsibilities[:, N_PLAIN:].T
+        if all(
+            each.max() > 0.5 and each @ wrong[number] <= 2 + 0.02 * 11 * each.sum()
+            for number, each in zip(chosen, of, strict=True)
+        ):
+            evidence[chosen] = shares.log_evidence + sum(structures[number].log_prior for number in chosen)
+    best = choose_kinds(pool, plain, trials)[0]
+    assert best.log_evidence == pytest.approx(evidence[best.structures])
+    assert best.structures == max(evidence, key=evidence.__getitem__)
+
+
+def test_of_structures_that_explain_nearly_as_much_the_best_are_believed_in():
+    """Each takes the place of the best one; beside it none gains what it costs beforehand."""
+    behind = (3.0, 0.0, 2.0, 1.0, 4.0)
+    pool, trials = pool_of([[-20.0 - each, *[-20.0] * 5] for each in behind], wide(6) * 5)
+    sets = choose_kinds(pool, np.full((6, 2), -60.0), trials)
+    assert [each.structures for each in sets] == [(1,), (3,), (2,)]
+    assert [sets[0].log_evidence - each.log_evidence for each in sets] == pytest.approx([0.0, 1.0, 2.0])
+
+
+@pytest.mark.parametrize(
+    ("wrong", "slips", "is_one"), [(1.8, 0.7, True), (1.9, 0, False), (0, 2.5, True), (1, 1.7, False)]
+)
+def test_wrong_looks_and_slips_beyond_a_limit_are_none_of_a_kind(wrong, slips, is_one):
+    """Of eleven looks 1.83 wrong ones, and 2.6 of either."""
+    ((kind,), trials), plain = pool_of([[-20.0]], wide(3)), np.array([[-25.0, -30.0]])
+    kind.events[0, [WRONG, SLIP]] = wrong, slips
+    assert kind_table([kind], plain, trials)[0, N_PLAIN] == (-20.0 if is_one else -35.0)

@@ -1,4 +1,5 @@
 import json
+import math
 from dataclasses import astuple, replace
 from fractions import Fraction
 
@@ -173,6 +174,52 @@ def test_an_object_of_which_there_is_no_trial_follows_nothing():
     assert best.followers[0] > 0.99
     assert best.followers[1] == 0
     assert not best.contents[1].any()
+
+
+def test_trials_that_change_hands_are_learned_from_as_if_they_had_always_been_of_their_objects():
+    rng, names = np.random.default_rng(0), ["two", "new", "one"]
+    objects = [
+        *objects_of(RING, [(0, 1, 2), (0, 3, 1)]),
+        Object([(0, 2), (3, 4), (4, 1)], rng.integers(3, size=(3, 2)).tolist()),
+    ]
+    trials = [trial_of(objects[number % 3], 8, rng) for number in range(9)]
+    learner, anew = StructureLearner(RING_WORLD), StructureLearner(RING_WORLD)
+    learner.restore(["one"] * 5 + ["two"] * 4, trials, [RING], Rates())
+    before = learner.believed(names)[0]
+    learner.hand_over({1: "two", 4: "two", 5: "new", 6: "one", 8: "new"})
+    anew.restore(["one", "two", "one", "one", "two", "new", "one", "two", "new"], trials, [RING], Rates())
+    (mine,), (yours,) = learner.believed(names), anew.believed(names)
+    assert not np.allclose(mine.contents, before.contents)
+    for found, expected in zip(mine[1:], yours[1:], strict=True):
+        np.testing.assert_allclose(found, expected, atol=1e-12)
+    for found, expected in zip(learner.uncertain(names)[1:], anew.uncertain(names)[1:], strict=True):
+        np.testing.assert_allclose(found, expected, atol=1e-12)
+    assert learner.gain == pytest.approx(anew.gain)
+
+
+def test_in_whatever_order_objects_are_asked_for_each_has_its_own_contents():
+    contents = [(0, 1, 2), (3, 4, 0), (2, 0, 4)]
+    rng, learner = np.random.default_rng(0), StructureLearner(RING_WORLD)
+    trials = [trial_of(each, 12, rng) for each in objects_of(RING, contents)]
+    learner.restore(["0", "1", "2"], trials, [RING], Rates())
+    (best, *_), (again, *_) = learner.believed(["0", "1", "2"]), learner.believed(["2", "nobody", "0"])
+    for name, own in zip("012", best.contents, strict=True):
+        assert sorted(own.argmax(axis=1).tolist()) == sorted(contents[int(name)])
+    np.testing.assert_array_equal(again.contents[[0, 2]], best.contents[[2, 0]])
+    np.testing.assert_array_equal(again.followers[[0, 2]], best.followers[[2, 0]])
+
+
+def test_sets_of_kinds_are_believed_in_by_their_evidence_and_followers_are_those_of_the_set():
+    trials = [trial_of(each, 3, np.random.default_rng(0)) for each in cubes(2)]
+    learner = StructureLearner(ARCUBES)
+    learner.restore(["0", "1"], trials, [CUBE], Rates())
+    sets = {each.structures: each for each in learner._sets}
+    (cube,) = learner.believed(["0", "1"])
+    odds = math.exp(sets[(0,)].log_evidence - sets[()].log_evidence)
+    assert 0.01 < cube.weight < 0.99
+    assert cube.weight == pytest.approx(odds / (1 + odds))
+    assert cube.share == pytest.approx(sets[(0,)].trials.shares[-1])
+    np.testing.assert_allclose(cube.followers, sets[(0,)].trials.responsibilities[:, -1], atol=0.02)
 
 
 def test_a_restored_learner_goes_on_as_the_old_one_would():

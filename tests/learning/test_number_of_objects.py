@@ -1,4 +1,5 @@
 import itertools
+import math
 
 import numpy as np
 import pytest
@@ -51,3 +52,11 @@ def test_far_more_objects_than_told_are_not_impossible():
 
 def test_large_numbers_of_objects_cost_no_more():
     assert np.isfinite(log_partition(2**53, 5, 8)).all()
+
+
+@pytest.mark.parametrize(("n_objects", "n_trials"), [(2_000, 60), (20_000, 30)])
+def test_some_numbers_of_objects_stand_for_all_of_many(n_objects, n_trials):
+    found = np.exp(log_partition(n_objects, n_trials, 8))
+    for known in (3, 8):
+        each = [math.perm(m, known) / m**n_trials for m in range(known, n_objects + 1)]
+        assert found[known] == pytest.approx(1e-4 / n_objects * sum(each) + 0.9999 * each[-1], rel=0.03)

@@ -100,3 +100,33 @@ def test_looks_at_nothing_say_nothing():
     evidence = PlainEvidence(ARCUBES)
     evidence.catch_up([RawTrial(((None, None), (None, None)), (0,))], ["it"])
     assert evidence.fresh == pytest.approx(0.0)
+
+
+def test_what_was_forgotten_has_no_say_in_what_comes_after():
+    trials = [small_trial(looks, (0, 1)) for looks in ((0, 1, 2), (0, 2, 1), (0, 1, 2))]
+    again, anew = PlainEvidence(SMALL), PlainEvidence(SMALL)
+    again.catch_up(trials, ["one", "one", "two"])
+    again.forget()
+    for each in (again, anew):
+        each.catch_up(trials, ["one", "two", "two"])
+    for table in ("fresh", "own", "summed"):
+        np.testing.assert_array_equal(getattr(again, table), getattr(anew, table))
+
+
+def test_of_many_objects_a_trial_may_be_of_those_that_share_most_with_it():
+    many = Assumptions(30, 4, ("turn",), PatternAlphabet(("front",), 30))
+    trials = [small_trial((0, 1, 2, 3), (0, 0, 0)), *(small_trial((0, 1, n, n), (0, 0, 0)) for n in range(4, 16))]
+    filed, unfiled = PlainEvidence(many), PlainEvidence(many)
+    for evidence, owner in ((filed, "0"), (unfiled, "another")):
+        evidence.catch_up([*trials, trials[0]], [*map(str, range(13)), owner])
+    assert unfiled.summed[-1, 0] == pytest.approx(filed.own[-1, 0] - math.log(30), abs=1e-3)
+
+
+@pytest.mark.parametrize("noise", UNCERTAIN[::5])
+def test_noise_is_that_of_trials_whose_objects_are_summed_out(noise):
+    evidence = PlainEvidence(SMALL)
+    assert evidence.best_noise(np.zeros(0)) == USUAL  # it costs nothing beforehand
+    evidence.fresh, evidence.own, evidence.summed = (np.zeros((2, 1 + len(UNCERTAIN))) for _ in range(3))
+    evidence.summed[0, 1 + UNCERTAIN.index(noise)] = 1.0
+    evidence.summed[1, 1], evidence.own[0, 1] = 9.0, 9.0  # of another trial, and of what was taken for the object
+    assert evidence.best_noise(np.array([1.0, 0.0])) == noise
