@@ -40,7 +40,7 @@ FAULTS = [
     ),
     Fault(
         "posterior not normalised",
-        "engines/filtering.py",
+        "engines/bayes_filter.py",
         "self._state = FilterState(log_joint - log_probability, aspects)",
         "self._state = FilterState(log_joint, aspects)",
     ),

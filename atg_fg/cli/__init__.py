@@ -23,7 +23,7 @@ COMMANDS: Final = {
     "Try it": {
         "demo": "atg_fg.cli.demo:demo",
         "trial": "atg_fg.cli.trials:trial",
-        "watch": "atg_fg.cli.watch:watch",
+        "watch": "atg_fg.cli.demo:watch",
         "doctor": "atg_fg.cli.doctor:doctor",
     },
     "Your data": {
@@ -46,7 +46,7 @@ COMMANDS: Final = {
     "Experiments": {
         "table1": "atg_fg.cli.experiments:table1",
         "figure3": "atg_fg.cli.experiments:figure3",
-        "ablation": "atg_fg.cli.ablation:ablation",
+        "ablation": "atg_fg.cli.experiments:ablation",
         "rescore": "atg_fg.cli.rescore:rescore",
         "goal": "atg_fg.cli.goal:goal",
     },

@@ -1,7 +1,8 @@
-"""``atg-fg demo``: one recognition trial on the robot, told step by step, and filmed."""
+"""``atg-fg demo`` and ``watch``: one recognition trial on the robot, told step by step, filmed, or in the Rerun viewer."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import closing
 from pathlib import Path
 from typing import Annotated, Any, Final
@@ -10,18 +11,76 @@ import numpy as np
 import typer
 
 from atg_fg.cli import options
-from atg_fg.cli.beforehand import N_REMEMBERED, PICTURE_BOXES, told_world, world_with_memory
 from atg_fg.cli.story import Story
+from atg_fg.cli.terminal import say
+from atg_fg.core.assumptions import arcube_assumptions
 from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.records import TrialRecord, TrialStep
 from atg_fg.display import figures, trial_plots
 from atg_fg.display.frames import FrameFolder, has_camera
+from atg_fg.display.rerun_viewer import TrialViewer, check_path, import_rerun
 from atg_fg.engines import begin_trial
+from atg_fg.experiments.exploration import explore, learned_memory
 from atg_fg.experiments.trial import learn_from, run_trial
-from atg_fg.policies import EntropyPolicy
+from atg_fg.learning.structured_memory import memory_for
+from atg_fg.policies import EntropyPolicy, RandomPolicy, make_policy
 from atg_fg.storage import memory_files, plain_files
 from atg_fg.storage.trial_record import to_json_lines
+from atg_fg.worlds.arcube import Cube, make_arcubes
 from atg_fg.worlds.base import World
+from atg_fg.worlds.registry import assumptions_of, check_arcube_world, make_world, sense_of
+
+N_REMEMBERED: Final = 6
+#: Boxes without tags, before the robot and before a rendered camera, where the robot learns what it remembers.
+PICTURE_BOXES, RENDERED_BOXES = "robonaut-picture-box", "picture-box"
+_ACTIONS: Final = 12
+
+
+def told_world(world: str) -> str:
+    """Return the name of the world that is told of where a user names ``world``: boxes are turned by the robot.
+
+    Raises:
+        InvalidInputError: It is neither of ARcubes nor of boxes.
+    """
+    if world in (PICTURE_BOXES, RENDERED_BOXES):
+        return PICTURE_BOXES
+    check_arcube_world("--world", world)
+    return world
+
+
+def world_with_memory(
+    world: str, parameters: ModelParameters, seed: int, rng: np.random.Generator, **options: Any
+) -> tuple[World, RobotMemory]:
+    """Return a world of seven objects, and the memory of a robot that turned over the first six, one after the other.
+
+    Args:
+        world: Name, as ``told_world`` returns it.
+        parameters: Say whether the memory learns what objects share.
+        seed: Of the objects.
+        rng: Of the trials in which they were learned.
+        options: Of the world.
+    """
+    n_objects = N_REMEMBERED + 1
+    if world == PICTURE_BOXES:
+        own: dict[str, Any] = {"n_objects": n_objects, "objects_seed": seed}
+        made = make_world(world, **own, **options)
+        with closing(make_world(RENDERED_BOXES, **own)) as rendered:
+            memory = memory_for(parameters, RobotMemory(assumptions_of(rendered, n_objects), sense=sense_of(rendered)))
+            explore(memory, rendered, N_REMEMBERED, RandomPolicy(), _ACTIONS, rng)
+        return made, memory
+    cubes = make_arcubes(n_objects, seed)
+    return make_world(world, cubes=cubes, **options), learn_beforehand(cubes, parameters, rng)
+
+
+def learn_beforehand(cubes: Sequence[Cube], parameters: ModelParameters, rng: np.random.Generator) -> RobotMemory:
+    """Return the memory of a robot that turned each of the first six cubes over at random, twelve times.
+
+    It did so in the ideal world, and knew that each was new.
+    """
+    assumptions, remembered = arcube_assumptions(), cubes[:N_REMEMBERED]
+    return learned_memory(assumptions, remembered, RandomPolicy(), _ACTIONS, rng, parameters=parameters)
+
 
 #: Options of the worlds that have a camera: its last frame is saved, or a film of the trial.
 CAMERAS: Final[dict[str, dict[str, Any]]] = {
@@ -113,3 +172,60 @@ def _save(folder: Path, world: World, record: TrialRecord, memory: RobotMemory, 
     plain_files.write_bytes_atomically(folder / "trial.jsonl", lines.encode())
     learn_from(record, memory)
     memory_files.save_memory(memory, folder / "memory.json")
+
+
+def watch(
+    world: options.DemoWorld = "robonaut",
+    engine: options.PresetsEngine = None,
+    preset: options.Preset = "default",
+    policy: options.Policy = "entropy",
+    actions: options.Actions = 8,
+    novel: Annotated[bool, typer.Option("--novel", help="Present an object the robot has never met.")] = False,
+    save: Annotated[
+        Path | None,
+        typer.Option(writable=True, help="Save a recording (.rrd) instead of opening the viewer; needs no screen."),
+    ] = None,
+    condition: options.Condition = None,
+    urdf: options.Urdf = None,
+    seed: options.Seed = 0,
+) -> None:
+    """Watch the robot recognise one of six objects it remembers: the scene in 3D, belief and entropy.
+
+    The memory is learned beforehand, from the same objects turned at random in the ideal world, or before a rendered
+    camera if they are boxes without tags.
+
+    Example: atg-fg watch --world robonaut --save trial.rrd
+    """
+    world = told_world(world)
+    import_rerun()  # fails now rather than after the memory is learned, if it is not installed
+    if save is not None:
+        check_path(save)
+    parameters, engine = options.model_of(preset, engine, "bayes-filter")
+    chosen_policy = make_policy(policy)
+    learn_seed, trial_seed = np.random.SeedSequence(seed).spawn(2)
+    made_world, memory = world_with_memory(
+        world,
+        parameters,
+        seed,
+        np.random.default_rng(learn_seed),
+        **options.world_options(condition=condition, urdf=urdf),
+    )
+    with closing(made_world):
+        viewer = TrialViewer(made_world, memory, save)
+        story = Story(options.console(), memory)
+        rng = np.random.default_rng(trial_seed)
+        presented = N_REMEMBERED if novel else int(rng.integers(N_REMEMBERED))
+
+        def on_step(step: TrialStep) -> None:
+            story.tell(step)
+            viewer.tell(step)
+
+        inference = begin_trial(engine, memory, parameters)
+        record = run_trial(
+            made_world, inference, chosen_policy, actions, rng, reset_options={"object": presented}, on_step=on_step
+        )
+        story.verdict(record)
+        viewer.verdict(record)
+        viewer.close()
+    if save is not None:
+        say(f"saved: {save}")

@@ -12,8 +12,7 @@ from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.checks import brief, sequence
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.core.look_info import confidences_in, confidences_of, pattern_to_learn, truth_of
-from atg_fg.core.looks import Look, evidence_of
+from atg_fg.core.looks import Look, confidences_in, confidences_of, evidence_of, pattern_to_learn, truth_of
 from atg_fg.core.patterns import Confidences, Detection, FloatArray
 from atg_fg.core.table import Bar, Cell, Table, shortened
 

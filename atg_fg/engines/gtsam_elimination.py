@@ -26,7 +26,7 @@ import numpy as np
 
 from atg_fg.core.errors import ImpossibleEvidenceError
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.engines.filtering import FilterInference
+from atg_fg.engines.bayes_filter import FilterInference
 from atg_fg.inference import gtsam_factors as factors
 from atg_fg.inference.expected_entropy import NextPatternJoint, expected_entropies
 from atg_fg.inference.factor_graph import RecognitionGraph

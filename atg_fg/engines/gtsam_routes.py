@@ -9,7 +9,7 @@ from __future__ import annotations
 from abc import abstractmethod
 from collections.abc import Callable, Iterable, Sequence
 from math import prod
-from typing import Any, ClassVar, Final
+from typing import ClassVar, Final
 
 import gtsam
 import numpy as np
@@ -108,7 +108,7 @@ class GtsamRoute(WholeTrialInference):
             identity = graph.identity().probabilities
             joint = np.zeros((len(identity), chain.widths[-1]))
             for hypothesis in np.flatnonzero(identity):
-                joint[hypothesis] = self._aspect(graph.given(int(hypothesis)), graph.last)
+                joint[hypothesis] = self._aspects(graph.given(int(hypothesis)), [graph.last])[0]
         identity = identity / identity.sum()
         return Posterior(identity, joint_of(identity, joint), graph.log_evidence())
 
@@ -117,21 +117,17 @@ class GtsamRoute(WholeTrialInference):
         chain = self.chain(hypothesis).scaled()[0].balanced()[0]
         graph = RecognitionGraph(chain, n_unseen=1)
         try:
-            return self._aspects_given(graph)
+            return self._aspects(graph, range(graph.last + 1))
         except RuntimeError:  # GTSAM's only sign of a product that is zero
             return [np.zeros(width) for width in chain.widths]
-
-    @abstractmethod
-    def _aspect(self, graph: RecognitionGraph, time: int) -> FloatArray:
-        """Return p(X_time) in a graph with one object, shape [W_time]."""
 
     @abstractmethod
     def _marginals(self, graph: RecognitionGraph) -> tuple[FloatArray, FloatArray]:
         """Return p(O), shape [H], and weights of p(X_t | O), shape [H, W_t]."""
 
     @abstractmethod
-    def _aspects_given(self, graph: RecognitionGraph) -> list[FloatArray]:
-        """Return p(X_s) for every time s in a graph with one object, each of shape [W_s]."""
+    def _aspects(self, graph: RecognitionGraph, times: Iterable[int]) -> list[FloatArray]:
+        """Return p(X_s) for some times s in a graph with one object, each of shape [W_s]."""
 
 
 class _OrderedRoute(GtsamRoute):
@@ -180,12 +176,8 @@ class GtsamSequential(_OrderedRoute):
         aspects = {**objects, aspect_key(time): graph.chain.widths[time]}
         return factors.table(net.at(size - 1), objects), factors.table(net.at(size - 2), aspects)
 
-    def _aspects_given(self, graph: RecognitionGraph) -> list[FloatArray]:
-        return [self._aspect(graph, time) for time in range(graph.last + 1)]
-
-    def _aspect(self, graph: RecognitionGraph, time: int) -> FloatArray:
-        aspect: FloatArray = self._with_aspect(graph, time)[1][0]
-        return aspect
+    def _aspects(self, graph: RecognitionGraph, times: Iterable[int]) -> list[FloatArray]:
+        return [self._with_aspect(graph, time)[1][0] for time in times]
 
 
 class GtsamMultifrontal(_OrderedRoute):
@@ -200,17 +192,10 @@ class GtsamMultifrontal(_OrderedRoute):
         identity = factors.table(tree.marginalFactor(objects), {objects: sizes[objects]})
         return identity, factors.table(tree.joint(objects, last).product(), sizes)
 
-    def _aspects_given(self, graph: RecognitionGraph) -> list[FloatArray]:
+    def _aspects(self, graph: RecognitionGraph, times: Iterable[int]) -> list[FloatArray]:
         tree = graph.graph.eliminateMultifrontal(self._checked_order(graph, self._order(graph)))
-        return [self._of_tree(tree, graph, time) for time in range(graph.last + 1)]
-
-    def _aspect(self, graph: RecognitionGraph, time: int) -> FloatArray:
-        tree = graph.graph.eliminateMultifrontal(self._checked_order(graph, self._order(graph)))
-        return self._of_tree(tree, graph, time)
-
-    @staticmethod
-    def _of_tree(tree: Any, graph: RecognitionGraph, time: int) -> FloatArray:
-        return factors.table(tree.marginalFactor(aspect_key(time)), {aspect_key(time): graph.chain.widths[time]})
+        sizes = {time: {aspect_key(time): graph.chain.widths[time]} for time in times}
+        return [factors.table(tree.marginalFactor(aspect_key(time)), size) for time, size in sizes.items()]
 
 
 class GtsamMarginals(GtsamRoute):
@@ -227,17 +212,11 @@ class GtsamMarginals(GtsamRoute):
         identity = np.array(marginals.marginalProbabilities(graph.variable(object_key())))[:size]
         aspects = np.zeros((size, graph.chain.widths[-1]))
         for hypothesis in np.flatnonzero(identity):
-            aspects[hypothesis] = self._aspect(graph.given(int(hypothesis)), graph.last)
+            aspects[hypothesis] = self._aspects(graph.given(int(hypothesis)), [graph.last])[0]
         return identity, aspects
 
-    def _aspects_given(self, graph: RecognitionGraph) -> list[FloatArray]:
-        marginals = graph.marginals()
-        return [self._of_marginals(marginals, graph, time) for time in range(graph.last + 1)]
-
-    def _aspect(self, graph: RecognitionGraph, time: int) -> FloatArray:
-        return self._of_marginals(graph.marginals(), graph, time)
-
-    @staticmethod
-    def _of_marginals(marginals: Any, graph: RecognitionGraph, time: int) -> FloatArray:
-        probabilities = marginals.marginalProbabilities(graph.variable(aspect_key(time)))
-        return np.array(probabilities)[: graph.chain.widths[time]]
+    def _aspects(self, graph: RecognitionGraph, times: Iterable[int]) -> list[FloatArray]:
+        marginals, widths = graph.marginals(), graph.chain.widths
+        variables = {time: graph.variable(aspect_key(time)) for time in times}
+        found = {time: marginals.marginalProbabilities(variable) for time, variable in variables.items()}
+        return [np.array(probabilities)[: widths[time]] for time, probabilities in found.items()]

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from atg_fg.core.assumptions import Assumptions, arcube_assumptions
 from atg_fg.core.checks import MANY, instance, sequence, whole_number
 from atg_fg.core.errors import InvalidInputError, TooLargeError
-from atg_fg.core.look_info import evidence_in
+from atg_fg.core.looks import evidence_in
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, FloatArray, read_only

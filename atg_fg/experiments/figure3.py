@@ -9,10 +9,9 @@ from typing import Any
 
 from atg_fg.core.statistics import Rate, mean, rates_of, standard_error
 from atg_fg.core.table import Bar, Cell, Table
-from atg_fg.experiments.plans import unusual
 from atg_fg.experiments.result_log import ResultLog, run_logged
 from atg_fg.experiments.scores import pooled_interval
-from atg_fg.experiments.table1 import TestPlan
+from atg_fg.experiments.table1 import TestPlan, unusual
 
 
 @dataclass(frozen=True)

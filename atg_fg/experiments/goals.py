@@ -25,7 +25,7 @@ from atg_fg.engines import begin_trial, engine_for
 from atg_fg.experiments.executors.base import run_pieces
 from atg_fg.experiments.exploration import complete_memory, learned_memory
 from atg_fg.experiments.goal_scores import ServedObject, score, table_of_goals
-from atg_fg.experiments.plans import unusual
+from atg_fg.experiments.table1 import unusual
 from atg_fg.experiments.trial import run_trial
 from atg_fg.inference.all_different import identity_given_others
 from atg_fg.policies import POLICIES, GoalPolicy, check_entropy_threshold, make_policy

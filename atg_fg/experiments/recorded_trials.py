@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.core.look_info import measured_in, truth_of
+from atg_fg.core.looks import measured_in, truth_of
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence

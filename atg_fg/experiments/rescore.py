@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.core.look_info import evidence_in
+from atg_fg.core.looks import evidence_in
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.records import TrialRecord, TrialSummary

@@ -9,7 +9,7 @@ import numpy as np
 
 from atg_fg.core.checks import MANY, whole_number
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.core.look_info import confidences_in
+from atg_fg.core.looks import confidences_in
 from atg_fg.core.recordings import RecordedLook, RecordedTrial, Recording
 from atg_fg.worlds.base import World, detection_of
 from atg_fg.worlds.registry import assumptions_of, make_world_with, sense_of

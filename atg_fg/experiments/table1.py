@@ -5,10 +5,10 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Sequence
 from contextlib import closing
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -20,7 +20,6 @@ from atg_fg.core.records import Mended, TrialRecord, TrialSummary
 from atg_fg.engines import begin_trial, engine_for
 from atg_fg.experiments.executors.base import is_cluster, run_pieces
 from atg_fg.experiments.executors.steps import step_done
-from atg_fg.experiments.plans import unusual
 from atg_fg.experiments.scores import Score, TestResult
 from atg_fg.experiments.trial import learn_from, run_trial
 from atg_fg.inference.interface import Inference
@@ -36,6 +35,22 @@ from atg_fg.storage.plain_files import make_folder
 from atg_fg.storage.trial_log import TrialLog
 from atg_fg.worlds.base import World
 from atg_fg.worlds.registry import assumptions_of, make_world_with, sense_of
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+
+def unusual(plan: DataclassInstance) -> dict[str, Any]:
+    """Return what a plan has other than usual: a plan may get more to say, and old records still be gone on with."""
+    usual = _described(type(plan)())
+    return {name: value for name, value in _described(plan).items() if value != usual[name]}
+
+
+def _described(plan: DataclassInstance) -> dict[str, Any]:
+    description = asdict(plan)
+    if not description["parameters"]["learn_structure"]:
+        del description["parameters"]["learn_structure"]
+    return description
 
 
 @dataclass(frozen=True)

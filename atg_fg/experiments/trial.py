@@ -11,7 +11,7 @@ import numpy as np
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.checks import instance, whole_number
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.core.look_info import confidences_in, measured_in
+from atg_fg.core.looks import confidences_in, measured_in
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.patterns import Evidence
 from atg_fg.core.records import TrialRecord, TrialStep, TrialSummary

@@ -14,8 +14,7 @@ import numpy as np
 from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.core.look_info import evidence_in
-from atg_fg.core.looks import likely_pattern
+from atg_fg.core.looks import evidence_in, likely_pattern
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.merging import Merge
 from atg_fg.core.open_alphabets import Relabelling

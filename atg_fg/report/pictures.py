@@ -10,7 +10,7 @@ from typing import Final
 
 from atg_fg.core import checks
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.core.look_info import surest_looks
+from atg_fg.core.looks import surest_looks
 from atg_fg.core.records import StepSummary
 from atg_fg.storage.checked_json import read_entries
 from atg_fg.storage.plain_files import is_plain_file

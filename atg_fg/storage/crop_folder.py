@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, Final
 
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.core.look_info import surest_looks
+from atg_fg.core.looks import surest_looks
 from atg_fg.core.records import TrialStep, TrialSummary
 from atg_fg.storage import plain_files
 

@@ -9,7 +9,7 @@ from collections import Counter
 import numpy as np
 import pytest
 
-from atg_fg.cli.beforehand import learn_beforehand
+from atg_fg.cli.demo import learn_beforehand
 from atg_fg.display.rerun_viewer import TrialViewer
 from atg_fg.engines import begin_trial
 from atg_fg.experiments.trial import run_trial

@@ -8,7 +8,7 @@ import pytest
 from atg_fg.core.belief import IdentityBelief
 from atg_fg.core.errors import InvalidInputError, UnknownNameError
 from atg_fg.engines import ENGINES
-from atg_fg.engines.filtering import FilterInference
+from atg_fg.engines.bayes_filter import FilterInference
 from atg_fg.engines.testing import TOLERANCE, check_engine
 
 
