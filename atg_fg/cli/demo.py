@@ -1,4 +1,4 @@
-"""``atg-fg demo`` and ``watch``: one recognition trial on the robot, told step by step, filmed, or in the Rerun viewer."""
+"""``atg-fg demo`` and ``watch``: one recognition trial on the robot, told step by step, filmed or in a viewer."""
 
 from __future__ import annotations
 

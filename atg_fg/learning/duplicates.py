@@ -95,21 +95,23 @@ def find_duplicates(
 
 
 def merge_duplicates(
-    memory: RobotMemory, parameters: ModelParameters, of: str, threshold: float | None = None
+    memory: RobotMemory, parameters: ModelParameters, of: str | None = None, threshold: float | None = None
 ) -> list[Duplicate]:
-    """Merge an ATG with its duplicates, the most probable first, until none is left; return what was merged.
+    """Merge duplicates, the most probable first, until none is left; return what was merged.
+
+    They are looked for anew after each merge, for what was merged says more of the others.
 
     Args:
         memory: Changed in place; ``memory.unmerge`` undoes it.
         parameters: As for ``find_duplicates``.
-        of: Name of the ATG, such as the one that has just learned.
+        of: Name of the one ATG that is merged with its own, such as the one that has just learned; all if not given.
         threshold: As for ``find_duplicates``.
     """
     merged = []
-    while found := find_duplicates(memory, parameters, threshold, [of]):
+    while found := find_duplicates(memory, parameters, threshold, None if of is None else [of]):
         memory.merge(found[0].keep, found[0].drop)
         merged.append(found[0])
-        of = found[0].keep
+        of = of and found[0].keep
     return merged
 
 
