@@ -26,7 +26,7 @@ from atg_fg.experiments.trial import learn_from, run_trial
 from atg_fg.learning.structured_memory import memory_for
 from atg_fg.policies import EntropyPolicy, RandomPolicy, make_policy
 from atg_fg.storage import memory_files, plain_files
-from atg_fg.storage.trial_record import to_json_lines
+from atg_fg.storage.trial_log import to_json_lines
 from atg_fg.worlds.arcube import Cube, make_arcubes
 from atg_fg.worlds.base import World
 from atg_fg.worlds.registry import assumptions_of, check_arcube_world, make_world, sense_of

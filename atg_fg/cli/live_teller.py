@@ -17,7 +17,7 @@ from atg_fg.core.records import TrialRecord, TrialStep
 from atg_fg.experiments.live_session import Asked, Ended, Event, LiveSession, Looked, Noted
 from atg_fg.senses.opencv import png_of
 from atg_fg.storage import plain_files
-from atg_fg.storage.trial_record import to_json_lines
+from atg_fg.storage.trial_log import to_json_lines
 
 if TYPE_CHECKING:
     from atg_fg.display.live_page import LivePage

@@ -31,7 +31,7 @@ from atg_fg.storage.database.connection import is_database
 from atg_fg.storage.memory_files import load_memory, open_memory, save_trial
 from atg_fg.storage.presets import preset as preset_named
 from atg_fg.storage.scripted_trial import read_script
-from atg_fg.storage.trial_record import to_json_lines
+from atg_fg.storage.trial_log import to_json_lines
 from atg_fg.worlds.registry import assumptions_of, make_world_with, sense_of
 
 #: Objects of the world that ``atg-fg trial`` makes, |O|.

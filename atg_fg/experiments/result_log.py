@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final, Generic, TypeVar, get_type_hints
+from typing import TYPE_CHECKING, Any, Generic, TypeVar, get_type_hints
 
 from atg_fg.core.checks import brief, whole_number
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.experiments.scores import TestResult
+from atg_fg.experiments.scores import SCORES, TestResult
 from atg_fg.experiments.table1 import TestPlan, run_tests
 from atg_fg.storage.checked_json import read_list, read_object
 from atg_fg.storage.growing_file import GrowingFile
@@ -17,8 +17,6 @@ from atg_fg.storage.growing_file import GrowingFile
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
 
-
-_SCORES: Final = ("identification", "recognition", "success")
 
 Cell = TypeVar("Cell", bound="DataclassInstance")
 
@@ -54,17 +52,17 @@ class ResultLog(Generic[Cell]):
             InvalidInputError: The disk is full, or the file cannot be written for another reason.
         """
         self._results[cell, result.seed] = result
-        scores = {name: getattr(result, name) for name in _SCORES}
+        scores = {name: getattr(result, name) for name in SCORES}
         self._file.append({**asdict(cell), "seed": result.seed, **scores})
 
     def _take(self, line: Any, place: str) -> None:
         types = get_type_hints(self._cell_type)
-        entry = read_object(line, place, (*types, "seed", *_SCORES))
+        entry = read_object(line, place, (*types, "seed", *SCORES))
         for name, kind in types.items():
             if type(entry[name]) is not kind:
                 raise InvalidInputError(f"{place}: {name}: {brief(entry[name])}; expected a {kind.__name__}")
         seed = whole_number(entry["seed"], f"{place}: seed")
-        identification, recognition, success = (_count(entry[name], f"{place}: {name}") for name in _SCORES)
+        identification, recognition, success = (_count(entry[name], f"{place}: {name}") for name in SCORES)
         cell = self._cell_type(**{name: entry[name] for name in types})
         self._results[cell, seed] = TestResult(seed, identification, recognition, success)
 

@@ -14,6 +14,9 @@ from atg_fg.core.table import ROWS, Bar, Cell, Table, shortened
 from atg_fg.learning.duplicates import Duplicate
 from atg_fg.learning.structured_memory import StructuredMemory
 
+#: The scores of a test in the paper's Table 1.
+SCORES: Final = ("identification", "recognition", "success")
+
 
 @dataclass(frozen=True)
 class TestResult:
@@ -176,7 +179,7 @@ def summarise(results: Iterable[TestResult]) -> dict[str, Any]:
     tests = list(results)
     rates = {
         name: [score[0] / score[1] for score in (getattr(test, name) for test in tests) if score[1] > 0]
-        for name in ("identification", "recognition", "success")
+        for name in SCORES
     }
     return {
         "tests": [
@@ -239,30 +242,27 @@ def pooled_interval(tests: Sequence[TestResult], score: str) -> tuple[float, flo
     return wilson_interval(sum(right for right, _ in counts), sum(number for _, number in counts))
 
 
-_SCORES: Final = ("identification", "recognition", "success")
-
-
 def table_of_tests(tests: Sequence[TestResult], title: str = "") -> Table:
     """Return tests as the paper's Table 1 has them, with the average over tests and intervals over all trials."""
     rows: list[tuple[Cell, ...]] = [
-        (str(test.seed), *(_count(getattr(test, score)) for score in _SCORES)) for test in tests
+        (str(test.seed), *(_count(getattr(test, score)) for score in SCORES)) for test in tests
     ]
     rows = list(shortened(rows, ROWS, "tests"))
     if len(tests) > 1:
-        rows.append(("average", *(_average(tests, score) for score in _SCORES)))
-    rows.append(("95 % interval", *(_interval(tests, score) for score in _SCORES)))
+        rows.append(("average", *(_average(tests, score) for score in SCORES)))
+    rows.append(("95 % interval", *(_interval(tests, score) for score in SCORES)))
     endings = [f"{number} {name}" for name in ("lost", "undecided") if (number := sum(getattr(t, name) for t in tests))]
     noun = "test" if len(tests) == 1 else "tests"
-    return Table(title or f"{len(tests)} {noun}", ("seed", *_SCORES), tuple(rows), ", ".join(endings))
+    return Table(title or f"{len(tests)} {noun}", ("seed", *SCORES), tuple(rows), ", ".join(endings))
 
 
 def _comparison(compared: Mapping[str, Sequence[TestResult]], title: str) -> Table:
     rows: list[tuple[Cell, ...]] = []
     for name, tests in compared.items():
-        cells = [Bar(_average(tests, score).share, _with_interval(tests, score)) for score in _SCORES]
+        cells = [Bar(_average(tests, score).share, _with_interval(tests, score)) for score in SCORES]
         rows.append((name, str(len(tests)), *cells))
     note = "averages over tests; 95 % Wilson intervals over all trials"
-    return Table(title or "Tests compared", ("", "tests", *_SCORES), tuple(rows), note)
+    return Table(title or "Tests compared", ("", "tests", *SCORES), tuple(rows), note)
 
 
 def _count(count: tuple[int, int]) -> Bar:

@@ -76,7 +76,7 @@ class TrialPage:
         verdict: How it ended, as the robot says.
         truth: What was presented and came of it, by the world.
         right: Whether the verdict is right by the truth; ``None`` if the record cannot tell.
-        looks: All looks, at least one.
+        looks: All looks, at least one; ``with_graphs`` adds them.
         graphs: The ATGs that the looks point at.
         goal: The symbols wanted, ``None`` where any will do, if there was a goal.
         notes: Sentences on what the robot made of the trial later, or of its looks in the end.
@@ -87,8 +87,8 @@ class TrialPage:
     verdict: str
     truth: str
     right: bool | None
-    looks: tuple[Look, ...]
-    graphs: tuple[PlacedGraph, ...]
+    looks: tuple[Look, ...] = ()
+    graphs: tuple[PlacedGraph, ...] = ()
     goal: Detection | None = None
     notes: tuple[str, ...] = ()
     thumbnails: Mapping[int, str] = field(default_factory=dict)

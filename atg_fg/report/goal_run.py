@@ -75,8 +75,6 @@ def _page(
         verdict=f"{told_verdict(trial.verdict, trial.matched)}; {_ENDINGS[ending]}",
         truth=f"{told_truth(trial.truths[0])}, goal {'shown' if entry.get('shown') else 'not shown'}",
         right=_is_right(entry, ending),
-        looks=(),
-        graphs=(),
         goal=goal,
     )
     return with_graphs(page, looks_of(trial, n_unseen), memory, assumptions, trial.matched)

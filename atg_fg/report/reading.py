@@ -22,11 +22,10 @@ from atg_fg.storage.compact_file import is_compact
 from atg_fg.storage.database.connection import is_database
 from atg_fg.storage.memory_files import load_memory
 from atg_fg.storage.memory_json import MEMORY_FORMAT, memory_from_document
-from atg_fg.storage.plain_files import cannot_read, read_text_file, readable_again
+from atg_fg.storage.plain_files import GZIP, cannot_read, read_text_file, readable_again
 from atg_fg.storage.recorded_test import recorded_tests
-from atg_fg.storage.trial_record import TRIAL_FORMAT
+from atg_fg.storage.trial_log import TRIAL_FORMAT
 
-_GZIP: Final = b"\x1f\x8b"
 _EXPECTED: Final = (
     "expected a trial's record (trial --record), the trials of a test (table1 --records), a run (goal --records), "
     "a robot memory with its trials if it is a database, "
@@ -57,7 +56,7 @@ def _report_of(path: Path, memory: RobotMemory | None) -> Report:
         raise cannot_read(path, error, _EXPECTED.removeprefix("expected ")) from error
     if is_database(path):
         return read_database(path, memory)
-    if start.startswith(_GZIP):
+    if start.startswith(GZIP):
         if _is_goal_run(start):
             return read_goal_run(path, memory)
         (test,) = recorded_tests(path, None if memory is None else memory.assumptions)

@@ -49,8 +49,6 @@ def _page(each: Recognised, memory: RobotMemory) -> TrialPage:
         told_verdict(trial.verdict, trial.matched),
         told_truth(trial.truths[-1]) if each.trial.object is not None else "not known",
         each.right,
-        (),
-        (),
         notes=told_mistakes(trial, memory.assumptions),
     )
     return with_graphs(page, looks, memory, memory.assumptions, trial.matched or each.learned)

@@ -136,7 +136,7 @@ class Retelling:
         met = "met before" if known else "never met before" if self._was_empty else "in none of the trials before"
         truth = f"{told_truth(trial.truths[-1], self.score.name_of(trial.object))}, {met}"
         notes = told_mistakes(trial, self._assumptions)
-        page = TrialPage(title, told_verdict(trial.verdict, trial.matched), truth, None, (), (), notes=notes)
+        page = TrialPage(title, told_verdict(trial.verdict, trial.matched), truth, None, notes=notes)
         page = with_graphs(page, looks, self._memory if self.inferred else None, self._assumptions, trial.matched)
         right = self.score.add(trial, learn_from(trial, self._memory), self._memory)
         return replace(page, right=right if known or self._was_empty else None)

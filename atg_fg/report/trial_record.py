@@ -20,8 +20,7 @@ from atg_fg.report.pictures import data_address, thumbnails
 from atg_fg.report.summaries import look_of, told_mistakes, told_truth, told_verdict, with_graphs
 from atg_fg.storage.checked_json import check_format, parse_json, read_entries, read_info, read_list, read_object
 from atg_fg.storage.memory_json import read_assumptions
-from atg_fg.storage.trial_log import read_step, summary_of
-from atg_fg.storage.trial_record import TRIAL_FORMAT
+from atg_fg.storage.trial_log import TRIAL_FORMAT, read_step, summary_of
 
 #: Remembered objects that are shown by name at each look.
 TOP = 6
@@ -78,8 +77,6 @@ def read_trial_record(text: str, path: Path, memory: RobotMemory | None) -> Repo
         truth=told_truth(read_info(end["truth"], f"{place}: verdict: truth")),
         # From a memory with objects, the record does not say which of them this one is by the truth.
         right=None if names else trial.verdict == "novel",
-        looks=(),
-        graphs=(),
         notes=told_mistakes(trial, assumptions),
         thumbnails=thumbnails(
             ((f"{path}: line {number}", read) for number, (read, _) in enumerate(looks, 2)), path.parent

@@ -14,7 +14,7 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from atg_fg.core.checks import brief
+from atg_fg.core.checks import finite_array, floats
 from atg_fg.core.errors import InvalidInputError, unknown_name
 from atg_fg.core.patterns import Evidence, FloatArray, PatternAlphabet
 from atg_fg.senses.opencv import cv2
@@ -133,33 +133,22 @@ class Tags:
         )
 
 
-def checked_intrinsics(matrix: ArrayLike, place: str = "intrinsics") -> FloatArray:
+def checked_intrinsics(matrix: ArrayLike) -> FloatArray:
     """Return a camera matrix of shape [3, 3], or raise ``InvalidInputError``."""
-    made = _numbers(matrix, place, "a camera matrix of 3 by 3 numbers")
-    if made.shape != (3, 3) or not (made[0, 0] > 0 and made[1, 1] > 0) or made[2].tolist() != [0, 0, 1]:
-        raise InvalidInputError(
-            f"{place}: {made.tolist()}; expected a camera matrix of 3 by 3 numbers, focal lengths above 0, "
-            "the last row 0, 0, 1"
-        )
+    expected = "a camera matrix of 3 by 3 numbers, focal lengths above 0, the last row 0, 0, 1"
+    made = finite_array(matrix, "intrinsics", (3, 3), expected).copy()
+    if not (made[0, 0] > 0 and made[1, 1] > 0) or made[2].tolist() != [0, 0, 1]:
+        raise InvalidInputError(f"intrinsics: {made.tolist()}; expected {expected}")
     return made
 
 
-def checked_distortion(coefficients: ArrayLike, place: str = "distortion") -> FloatArray:
+def checked_distortion(coefficients: ArrayLike) -> FloatArray:
     """Return the coefficients of a lens, or raise ``InvalidInputError``."""
-    made = _numbers(coefficients, place, f"numbers, {', '.join(map(str, _DISTORTIONS))} of them").ravel()
+    expected = ", ".join(map(str, _DISTORTIONS))
+    made = floats(coefficients, "distortion", f"numbers, {expected} of them").ravel()
     if len(made) not in _DISTORTIONS:
-        raise InvalidInputError(f"{place}: {len(made)} numbers; expected {', '.join(map(str, _DISTORTIONS))}")
-    return made
-
-
-def _numbers(values: ArrayLike, place: str, expected: str) -> FloatArray:
-    try:
-        made = np.array(values, dtype=np.float64)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise InvalidInputError(f"{place}: {brief(values)}; expected {expected}") from error
-    if not np.isfinite(made).all():
-        raise InvalidInputError(f"{place}: {made.tolist()}; expected finite numbers")
-    return made
+        raise InvalidInputError(f"distortion: {len(made)} numbers; expected {expected}")
+    return finite_array(made, "distortion", (None,), "finite numbers")
 
 
 @dataclass(frozen=True, eq=False)

@@ -33,11 +33,11 @@ _UNLIKELY: Final = 60.0
 _GLUED: Final = 15.0
 
 
-def nearest_rotation(rotation: FloatArray) -> tuple[int, float]:
-    """Return which of ``CUBE_ROTATIONS`` a rotation matrix is nearest to, and how far it is from it, degrees."""
+def nearest_rotation(rotation: FloatArray) -> tuple[float, int]:
+    """Return how far a rotation matrix is from the nearest of ``CUBE_ROTATIONS``, degrees, and which that is."""
     traces = np.einsum("oij,ij->o", CUBE_ROTATIONS, rotation)
     nearest = int(traces.argmax())
-    return nearest, math.degrees(math.acos(np.clip((traces[nearest] - 1) / 2, -1, 1)))
+    return math.degrees(math.acos(np.clip((traces[nearest] - 1) / 2, -1, 1))), nearest
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,10 +108,10 @@ class TurnWatcher:
         self._viewpoint_is_guessed = viewpoint is None
         self.actions = tuple(actions)
         self._sequences = _shortest_sequences(actions)
-        self._forget()
+        self.forget_cube()
 
-    def _forget(self) -> None:
-        """Begin with another cube."""
+    def forget_cube(self) -> None:
+        """Take what is seen next for another cube."""
         self._before: Sequence[DetectedTag] = ()
         self._still_since = math.inf
         self._last_seen: float | None = None
@@ -145,15 +145,11 @@ class TurnWatcher:
         self._note_places(believed)
         return None if self._reported and not self._hidden else self._at_rest(time, believed)
 
-    def forget_cube(self) -> None:
-        """Take what is seen next for another cube."""
-        self._forget()
-
     def _not_seen(self, time: float) -> CubeTakenAway | None:
         self._before = ()
         if self._last_seen is None or time - self._last_seen < self.patience.absent:
             return None
-        self._forget()
+        self.forget_cube()
         return CubeTakenAway()
 
     def _has_moved(self, tags: Sequence[DetectedTag]) -> bool:
@@ -199,7 +195,7 @@ class TurnWatcher:
         if _ambiguity(tag) < _CLEAR:
             return tag
         axes = self.viewpoint.axes
-        straightest, _ = min(_rotations(tag), key=lambda each: _straight(axes @ each[0])[0] + each[1])
+        straightest, _ = min(_rotations(tag), key=lambda each: nearest_rotation(axes @ each[0])[0] + each[1])
         assert tag.pose is not None
         return replace(tag, pose=replace(tag.pose, rotation=straightest))
 
@@ -217,7 +213,7 @@ class TurnWatcher:
         for tag in tags:
             if tag.id not in self._on_cube and (stands or _ambiguity(tag) < _CLEAR):
                 # Of the two poses that show the tag alike, that in which it sits straight on the cube.
-                (off, place), *others = sorted(_straight(cube.T @ rotation) for rotation, _ in _rotations(tag))
+                (off, place), *others = sorted(nearest_rotation(cube.T @ rotation) for rotation, _ in _rotations(tag))
                 if off < _GLUED and all(place == other or apart > 2 * off for apart, other in others):
                     self._on_cube[tag.id] = CUBE_ROTATIONS[place]
 
@@ -235,7 +231,7 @@ class TurnWatcher:
         def disagreement(cube: FloatArray) -> float:
             total = sum(min(_angle(cube, each) + cost for each, cost in rotations) for rotations in allowed)
             if stands:
-                total += _straight(self.viewpoint.axes @ cube)[0]
+                total += nearest_rotation(self.viewpoint.axes @ cube)[0]
             elif self._turned is not None and len(known) == 1 and _ambiguity(known[0]) > _CLEAR:
                 total += _angle(cube, self._turned)
             return total
@@ -248,7 +244,7 @@ class TurnWatcher:
         cube = self._cube_rotation(tags, stands=True)
         if cube is None:
             return None
-        off, stands = _straight(self.viewpoint.axes @ cube)
+        off, stands = nearest_rotation(self.viewpoint.axes @ cube)
         return stands if off < self.patience.skew else None
 
 
@@ -274,25 +270,19 @@ def _angle(one: FloatArray, other: FloatArray) -> float:
     return math.degrees(math.acos(np.clip(((one * other).sum() - 1) / 2, -1, 1)))
 
 
-def _straight(rotation: FloatArray) -> tuple[float, int]:
-    """Return how far a rotation is from the nearest of ``CUBE_ROTATIONS``, degrees, and which that is."""
-    nearest, off = nearest_rotation(rotation)
-    return off, nearest
-
-
 def _composed(after: int, before: int) -> int:
     """Return the rotation that leads from one of the 24 to another."""
-    return nearest_rotation(CUBE_ROTATIONS[after] @ CUBE_ROTATIONS[before].T)[0]
+    return nearest_rotation(CUBE_ROTATIONS[after] @ CUBE_ROTATIONS[before].T)[1]
 
 
 def _shortest_sequences(actions: Mapping[str, FloatArray]) -> dict[int, tuple[str, ...]]:
     """Return the fewest actions that turn a cube by each of the rotations that they can reach."""
-    upright = nearest_rotation(np.eye(3))[0]
+    upright = nearest_rotation(np.eye(3))[1]
     sequences: dict[int, tuple[str, ...]] = {upright: ()}
     reached = [upright]
     for number in reached:  # grows while it is walked: breadth first
         for name, rotation in actions.items():
-            turned = nearest_rotation(rotation @ CUBE_ROTATIONS[number])[0]
+            turned = nearest_rotation(rotation @ CUBE_ROTATIONS[number])[1]
             if turned not in sequences:
                 sequences[turned] = (*sequences[number], name)
                 reached.append(turned)

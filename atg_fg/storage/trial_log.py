@@ -6,6 +6,7 @@ whatever is of a wrong type, out of its range, or does not fit the rest is refus
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, Final
@@ -14,9 +15,10 @@ from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.checks import number, one_of, plain_text, whole_number
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import Detection, Evidence
-from atg_fg.core.records import VERDICTS, Mended, Mistake, StepSummary, TrialSummary
-from atg_fg.storage.checked_json import read_entries, read_info, read_list, read_object, without_none
+from atg_fg.core.records import VERDICTS, Mended, Mistake, StepSummary, TrialRecord, TrialSummary
+from atg_fg.storage.checked_json import plain_json, read_entries, read_info, read_list, read_object, without_none
 from atg_fg.storage.growing_file import GrowingFile, read_lines
+from atg_fg.storage.memory_json import write_assumptions
 
 _FORMAT: Final = {"format": "atg-fg/test", "version": 1}
 _KEYS: Final = ("verdict", "matched", "observed", "actions", "unseen", "entropy", "truth")
@@ -257,3 +259,48 @@ def read_log(path: Path) -> tuple[dict[str, Any], list[Any]]:
     if {name: header.get(name) for name in _FORMAT} != _FORMAT:
         raise InvalidInputError(f"{path}: is not a log of trials; expected a file that --records wrote")
     return {name: value for name, value in header.items() if name not in _FORMAT}, lines[1:]
+
+
+#: What the first line of a record says that it is.
+TRIAL_FORMAT: Final = "atg-fg/trial"
+
+
+def to_json_lines(record: TrialRecord, pictures: Sequence[Mapping[str, Any]] = (), **header: Any) -> str:
+    """Return the record as JSON lines: a header, a line a step, the verdict.
+
+    Args:
+        record: The trial.
+        pictures: Paths of ``frame`` and ``crops`` of each look, from the record's folder, if there are any.
+        header: What else the header says.
+    """
+    assumptions = write_assumptions(record.assumptions)
+    lines: list[dict[str, Any]] = [
+        {"format": TRIAL_FORMAT, "version": 1, "objects": record.names, "assumptions": assumptions, **header}
+    ]
+    lines += [_step_line(record, time) for time in range(len(record.steps))]
+    for line, paths in zip(lines[1:], pictures, strict=False):
+        line.update(paths)
+    verdict = {"outcome": record.verdict, "judged_novel": record.judged_novel, "matched": record.matched}
+    mistakes = {"mistakes": [list(each) for each in record.mistakes]} if record.mistakes else {}
+    lines.append({"verdict": {**verdict, **mistakes, "truth": record.lost_truth or record.steps[-1].truth}})
+    return "".join(json.dumps(line, default=plain_json, allow_nan=False) + "\n" for line in lines)
+
+
+def _step_line(record: TrialRecord, time: int) -> dict[str, Any]:
+    step, actions = record.steps[time], record.assumptions.actions
+    bound = step.total_variation_bound
+    expected = step.expected_entropies
+    line = {
+        "step": time,
+        "observed": step.detection,
+        "objects": step.belief.objects,
+        "unseen": step.belief.unseen,
+        "entropy": step.belief.entropy,
+        "log_evidence": step.log_evidence,
+        "expected_entropy": None if expected is None else dict(zip(actions, expected.tolist(), strict=True)),
+        "action": None if step.action is None else actions[step.action],
+        "purpose": step.purpose,
+        "total_variation_bound": bound,
+        "truth": step.truth,
+    }
+    return without_none(line, but_for=("expected_entropy", "action"))

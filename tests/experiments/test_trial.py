@@ -12,7 +12,7 @@ from atg_fg.experiments.trial import run_trial
 from atg_fg.policies import EntropyPolicy, RandomPolicy
 from atg_fg.storage.memory_json import read_assumptions
 from atg_fg.storage.presets import preset
-from atg_fg.storage.trial_record import to_json_lines
+from atg_fg.storage.trial_log import to_json_lines
 from atg_fg.worlds.arcube_world import ARcubeWorld
 from atg_fg.worlds.registry import make_world
 

@@ -11,7 +11,7 @@ from atg_fg.experiments.table1 import TestPlan, run_test
 from atg_fg.experiments.trial import run_trial
 from atg_fg.policies import EntropyPolicy
 from atg_fg.storage.presets import preset
-from atg_fg.storage.trial_record import to_json_lines
+from atg_fg.storage.trial_log import to_json_lines
 from atg_fg.worlds.registry import make_world
 from tests.cli.conftest import refused, run
 

@@ -73,7 +73,7 @@ def symbols(rest):
 
 def test_there_are_24_rotations_of_a_cube_and_the_worlds_are_among_them():
     assert CUBE_ROTATIONS.shape == (24, 3, 3)
-    assert {nearest_rotation(rotation_of(orientation)) for orientation in range(24)} == {(n, 0.0) for n in range(24)}
+    assert {nearest_rotation(rotation_of(orientation)) for orientation in range(24)} == {(0.0, n) for n in range(24)}
 
 
 def test_the_actions_turn_the_faces_where_the_world_says():

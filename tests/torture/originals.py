@@ -29,7 +29,7 @@ from atg_fg.storage.camera_files import CALIBRATION_FORMAT
 from atg_fg.storage.memory_files import open_memory
 from atg_fg.storage.presets import write_preset
 from atg_fg.storage.scripted_trial import read_script
-from atg_fg.storage.trial_record import to_json_lines
+from atg_fg.storage.trial_log import to_json_lines
 from atg_fg.storage.uai import write_evidence, write_model
 from atg_fg.storage.uai_export import export_trial
 from atg_fg.worlds.arcube import make_arcubes

@@ -180,26 +180,11 @@ class LargeMemory(Inference):
         return IdentityBelief(objects, float(weights[0]), self.model.n_unseen)
 
     @property
-    def n_matched(self) -> int:
-        """Number of remembered objects that are filtered one by one."""
-        return len(self._objects)
-
-    @property
     def total_variation_bound(self) -> float:
         """How far p(O) may be from exact: a bound of ½ Σ |p(O) − q(O)|, up to rounding."""
         if self._classes is None or not self.history.evidence:
             return 0.0
         return min(1.0, float(self._classes.members @ self._masses().unsure))
-
-    @property
-    def expected_entropy_bound(self) -> float:
-        """How far each of the expected entropies may be from exact, nats; asked after a look.
-
-        Raises:
-            InvalidInputError: Asked before a look or between an action and its look.
-        """
-        self._check_looked("expected entropy")
-        return self._decide().bound
 
     @property
     def fell_back(self) -> bool:

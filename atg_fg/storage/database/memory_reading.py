@@ -108,9 +108,7 @@ def _document(connection: sqlite3.Connection, place: str) -> dict[str, Any]:
 def _add_aspects(connection: sqlite3.Connection, graphs: dict[Any, dict[str, Any]], place: str) -> None:
     for graph, number, symbols in connection.execute("SELECT graph, number, symbols FROM aspects ORDER BY 1, 2"):
         aspects = _of(graphs, graph, f"{place}: aspects")["aspects"]
-        where = f"{place}: {graphs[graph]['name']!r}: aspects[{len(aspects)}]"
-        if whole_number(number, where, least=0) != len(aspects):
-            raise InvalidInputError(f"{where}: number {number}; expected {len(aspects)}")
+        where = _place_of_next(aspects, number, f"{place}: {graphs[graph]['name']!r}: aspects")
         aspects.append(_json(symbols, where))
 
 
@@ -142,9 +140,7 @@ def _structure(
     for number, graph, observed, actions, confidences, measured in connection.execute(
         "SELECT number, graph, observed, actions, confidences, measured FROM raw_trials ORDER BY number"
     ):
-        where = f"{place}.trials[{len(trials)}]"
-        if whole_number(number, where, least=0) != len(trials):
-            raise InvalidInputError(f"{where}: number {number}; expected {len(trials)}")
+        where = _place_of_next(trials, number, f"{place}.trials")
         owner = _of(graphs, graph, where)["name"]
         trials.append({"object": owner, "observed": _json(observed, where), "actions": _json(actions, where)})
         if confidences is not None:
@@ -158,11 +154,16 @@ def _sense(connection: sqlite3.Connection, text: Any, place: str) -> dict[str, A
     keys = ("features", "mean", "projection", "between", "within", "concentration")
     trials: list[Any] = []
     for number, document in connection.execute("SELECT number, document FROM sensed_trials ORDER BY number"):
-        where = f"{place}.trials[{len(trials)}]"
-        if whole_number(number, where, least=0) != len(trials):
-            raise InvalidInputError(f"{where}: number {number}; expected {len(trials)}")
-        trials.append(_json(document, where))
+        trials.append(_json(document, _place_of_next(trials, number, f"{place}.trials")))
     return {**read_object(_json(text, place), place, keys), "trials": trials}
+
+
+def _place_of_next(entries: list[Any], number: Any, place: str) -> str:
+    """Return the place of the next one of numbered rows, or raise ``InvalidInputError`` if it has another number."""
+    where = f"{place}[{len(entries)}]"
+    if whole_number(number, where, least=0) != len(entries):
+        raise InvalidInputError(f"{where}: number {number}; expected {len(entries)}")
+    return where
 
 
 def _of(graphs: dict[Any, dict[str, Any]], graph: Any, place: str) -> dict[str, Any]:
