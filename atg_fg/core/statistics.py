@@ -35,6 +35,12 @@ def wilson_interval(successes: int, trials: int) -> tuple[float, float]:
     return low, high
 
 
+def rate_document(count: int, of: int) -> dict[str, Any]:
+    """Return a counted rate as JSON knows it, with its interval; ``None`` for the rate of nothing."""
+    low, high = wilson_interval(count, of)
+    return {"count": count, "of": of, "rate": count / of if of else None, "interval95": [low, high]}
+
+
 def mean(values: Sequence[float]) -> float | None:
     """Return the mean, or ``None`` if there is no value."""
     return math.fsum(values) / len(values) if values else None

@@ -12,7 +12,7 @@ from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.goals import Goal
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.records import TrialRecord
-from atg_fg.core.statistics import mean, wilson_interval
+from atg_fg.core.statistics import mean, rate_document, wilson_interval
 from atg_fg.core.table import ROWS, Cell, Table, shortened
 from atg_fg.inference.known_transitions import transitions_of_graph
 from atg_fg.policies.shortest_paths import nearest_aspect, shortest_path
@@ -147,34 +147,27 @@ def summarise(runs: Sequence[Sequence[ServedObject]]) -> dict[str, Any]:
     return {
         "runs": len(runs),
         "goals": len(served),
-        "reached": _rate(sum(each.ending == "reached" for each in served), len(served)),
-        "reachable": _rate(len(reachable), len(served)),
-        "reached_of_reachable": _rate(len(approached), len(reachable)),
-        "declared_of_unreachable": _rate(sum(each.ending == "unreachable" for each in unreachable), len(unreachable)),
-        "runs_with_all_reachable_reached": _rate(
+        "reached": rate_document(sum(each.ending == "reached" for each in served), len(served)),
+        "reachable": rate_document(len(reachable), len(served)),
+        "reached_of_reachable": rate_document(len(approached), len(reachable)),
+        "declared_of_unreachable": rate_document(
+            sum(each.ending == "unreachable" for each in unreachable), len(unreachable)
+        ),
+        "runs_with_all_reachable_reached": rate_document(
             sum(all(each.ending == "reached" and each.shown for each in run if each.reachable) for run in runs),
             len(runs),
         ),
-        "wrong_success": _rate(
+        "wrong_success": rate_document(
             sum(each.ending == "reached" and not each.shown for each in served),
             sum(each.ending == "reached" for each in served),
         ),
-        "wrong_object": _rate(sum(each.wrong_object for each in served), len(served)),
+        "wrong_object": rate_document(sum(each.wrong_object for each in served), len(served)),
         "exhausted": sum(each.ending == "exhausted" for each in served),
         "lost": sum(each.ending == "lost" for each in served),
         "recognition_actions": mean([each.recognition_actions for each in served]),
         "goal_actions": mean([each.goal_actions for each in approached]),
         "optimum": mean([each.optimum for each in approached]),
-        "optimal": _rate(sum(each.goal_actions == each.optimum for each in approached), len(approached)),
-    }
-
-
-def _rate(count: int, total: int) -> dict[str, Any]:
-    return {
-        "count": count,
-        "of": total,
-        "rate": count / total if total else None,
-        "interval95": list(wilson_interval(count, total)),
+        "optimal": rate_document(sum(each.goal_actions == each.optimum for each in approached), len(approached)),
     }
 
 

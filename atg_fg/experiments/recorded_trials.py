@@ -15,7 +15,7 @@ from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence
 from atg_fg.core.recordings import RecordedTrial, Recording
 from atg_fg.core.records import TrialRecord, TrialStep, TrialSummary
-from atg_fg.core.statistics import wilson_interval
+from atg_fg.core.statistics import rate_document
 from atg_fg.engines import begin_trial
 from atg_fg.experiments.scores import Score
 from atg_fg.experiments.trial import can_be_learned, follow, learn_from, learn_steps
@@ -205,12 +205,7 @@ def score_document(scores: Score) -> dict[str, Any]:
         "recognition": (scores.recognised, scores.judged_known),
         **({} if scores.mended is None else {"mended": (scores.mended, scores.n_trials)}),
     }
-    return {name: _count(*count) for name, count in counts.items()}
-
-
-def _count(count: int, of: int) -> dict[str, Any]:
-    low, high = wilson_interval(count, of) if of else (0.0, 1.0)
-    return {"count": count, "of": of, "rate": count / of if of else None, "interval95": [low, high]}
+    return {name: rate_document(*count) for name, count in counts.items()}
 
 
 def names_by_majority(found: Sequence[Recognised], made_from: dict[str, object]) -> dict[str, object]:
