@@ -14,7 +14,6 @@ from typing import Final
 import numpy as np
 
 from atg_fg.core.assumptions import Assumptions
-from atg_fg.core.errors import TooLargeError
 from atg_fg.core.patterns import MISSING, FloatArray
 from atg_fg.learning.believed_structure import BelievedStructure, UncertainObjects
 from atg_fg.learning.candidate import Candidate
@@ -24,7 +23,8 @@ from atg_fg.learning.plain_evidence import USUAL, PlainEvidence, PlainNoise
 from atg_fg.learning.rates import Rates, Tally, estimate_rates
 from atg_fg.learning.raw_trials import RawTrial, Recording
 from atg_fg.learning.shared_structure import SharedStructure
-from atg_fg.learning.state_merging import merge_states, mode_automata
+from atg_fg.learning.state_merging import merged_draws
+from atg_fg.learning.structure_repair import follows, repairs
 
 #: A structure is settled if it is this many nats better than none.
 SETTLED_GAIN: Final = 50.0
@@ -48,14 +48,9 @@ N_CHAINS: Final = 3
 WRONG_LABEL: Final = 0.01
 
 
-#: States of trials that no structure explains are merged if there are this many, and this share of all, from so many
-#: draws of so many of them: for one mode, and for more. Where a draw with one mode has most of its trials follow, there
-#: is no need for further modes.
+#: Trials that no structure explains are merged if there are this many, and this share of all.
 LEAST_UNEXPLAINED: Final = 6
 UNEXPLAINED_SHARE: Final = 0.1
-N_DRAWS: Final = (24, 8)
-DRAWN: Final = 16
-MOST: Final = 0.75
 
 
 #: Rates that differ by less than this factor are as good as the same.
@@ -97,18 +92,23 @@ class StructureLearner:
         Args:
             owner: Name of its object.
             trial: What was seen and done.
-            rests: Whether the trial is only kept: what it says of structures at hand is made out when it is asked for.
+            rests: Whether the trial is only kept, unless it is a milestone, and no structures are searched for but by
+                merging: what it says of those at hand is made out when it is asked for.
         """
         self._append(owner, trial)
-        if rests or not self._can_explain:
+        at_milestone = is_milestone(len(self.trials))
+        if not self._can_explain or (rests and not at_milestone):
             return
         self._select()
-        if is_milestone(len(self.trials)):
+        self._repair()
+        if at_milestone:
             self._merge()
-            if self._is_worth_a_search():
+            if not rests and self._is_worth_a_search():
                 self._search()
             self._estimate_rates()
             self._select()
+        elif self._n_unexplained_is_milestone():
+            self._merge()
         self._estimate_noise()
 
     def restore(
@@ -295,25 +295,30 @@ class StructureLearner:
         self.n_evaluations += register_search.n_scored(len(alphabet.slots), n_actions, N_CHAINS)
         self._add(found[:MAX_PROPOSALS])
 
+    def _repair(self) -> None:
+        """Add structures that the last trial follows in place of one at hand that it contradicts."""
+        trial, best = self.trials[-1], self._sets[0]
+        kind = int(best.trials.responsibilities[-1].argmax())
+        for column, number in enumerate(best.structures, start=N_PLAIN):
+            structure = self._candidates[number].structure
+            if kind in (column, *range(N_PLAIN)) and not follows(trial, structure):
+                self._add(repairs(structure, trial, self.trials)[:MAX_PROPOSALS])
+                return
+
     def _merge(self) -> None:
         """Add what trials merge into that no structure at hand explains."""
         unexplained = self._unexplained()
-        if len(unexplained) < max(LEAST_UNEXPLAINED, UNEXPLAINED_SHARE * len(self.trials)):
-            return
-        rng = np.random.default_rng((self.seed, len(self.trials), 1))
-        found: dict[SharedStructure, int] = {}
-        for n_modes, n_draws in enumerate(N_DRAWS, start=1):
-            for _ in range(n_draws):
-                drawn = [self.trials[number] for number in rng.permutation(unexplained)[:DRAWN].tolist()]
-                merged = merge_states(drawn, mode_automata(n_modes, len(self.assumptions.actions)))
-                self.n_evaluations += len(merged)
-                for each in merged:
-                    if each is not None and _is_believable(each.structure):
-                        found[each.structure] = max(each.n_trials, found.get(each.structure, 0))
-            if max(found.values(), default=0) > MOST * min(DRAWN, len(unexplained)):
-                break
-        best = sorted(found, key=lambda structure: (-found[structure], -structure.log_prior))
-        self._add(best[:MAX_PROPOSALS])
+        if len(unexplained) >= max(LEAST_UNEXPLAINED, UNEXPLAINED_SHARE * len(self.trials)):
+            rng = np.random.default_rng((self.seed, len(self.trials), 1))
+            trials = [self.trials[number] for number in unexplained]
+            merged, n_scored = merged_draws(trials, len(self.assumptions.actions), rng)
+            self.n_evaluations += n_scored
+            self._add(merged[:MAX_PROPOSALS])
+
+    def _n_unexplained_is_milestone(self) -> bool:
+        """Whether the last trial follows no structure at hand, and is one more milestone among those."""
+        unexplained = self._unexplained()
+        return unexplained[-1:] == [len(self.trials) - 1] and is_milestone(len(unexplained))
 
     def _unexplained(self) -> list[int]:
         """Return the numbers of the trials that probably follow no structure at hand."""
@@ -323,7 +328,7 @@ class StructureLearner:
 
     def _add(self, structures: Sequence[SharedStructure]) -> None:
         for structure in structures:
-            if structure not in self.candidates and _is_believable(structure):
+            if structure not in self.candidates and structure.is_believable:
                 self._candidates.append(Candidate(structure, self.assumptions.alphabet))
         self._select()
 
@@ -391,11 +396,3 @@ class StructureLearner:
             return
         self.rates = estimated
         self._forget_scores()
-
-
-def _is_believable(structure: SharedStructure) -> bool:
-    try:
-        structure.poses()
-    except TooLargeError:
-        return False
-    return True

@@ -186,6 +186,15 @@ class SharedStructure:
             raise TooLargeError(f"structure: more than {limit} poses; expected at most that many")
         return closure
 
+    @property
+    def is_believable(self) -> bool:
+        """Whether it has no more poses than a structure may have."""
+        try:
+            self.poses()
+        except TooLargeError:
+            return False
+        return True
+
     def to_networkx(self) -> networkx.MultiDiGraph[int]:
         """Return the poses as nodes with ``registers``, those at each place, and an edge with ``action`` an action."""
         poses = self.poses()

@@ -31,6 +31,11 @@ MAX_REGISTERS: Final = 9
 MAX_HIDDEN: Final = 200
 #: Of the first trials so many are looked at before an automaton is given up that less than all but one of them follow.
 FIRST_TRIALS: Final = 4
+#: Draws of so many trials that are merged, for one mode and for more. Where most trials of a draw follow with one mode,
+#: no further ones are needed.
+N_DRAWS: Final = (24, 8)
+DRAWN: Final = 16
+MOST: Final = 0.75
 
 NextModes = tuple[tuple[int, ...], ...]
 
@@ -45,6 +50,33 @@ class Merged(NamedTuple):
 
     structure: SharedStructure
     n_trials: int
+
+
+def merged_draws(
+    trials: Sequence[RawTrial], n_actions: int, rng: np.random.Generator
+) -> tuple[list[SharedStructure], int]:
+    """Return the structures that draws of trials merge into, best first, and how many were tried.
+
+    The best is the one that most trials of a draw follow, and of these the most probable one beforehand.
+
+    Args:
+        trials: Perhaps of one kind, as no structure at hand explains them.
+        n_actions: A.
+        rng: Draws.
+    """
+    found: dict[SharedStructure, int] = {}
+    n_tried = 0
+    for n_modes, n_draws in enumerate(N_DRAWS, start=1):
+        for _ in range(n_draws):
+            drawn = [trials[number] for number in rng.permutation(len(trials))[:DRAWN].tolist()]
+            merged = merge_states(drawn, mode_automata(n_modes, n_actions))
+            n_tried += len(merged)
+            for each in merged:
+                if each is not None and each.structure.is_believable:
+                    found[each.structure] = max(each.n_trials, found.get(each.structure, 0))
+        if max(found.values(), default=0) > MOST * min(DRAWN, len(trials)):
+            break
+    return sorted(found, key=lambda structure: (-found[structure], -structure.log_prior)), n_tried
 
 
 def merge_states(trials: Sequence[RawTrial], automata: Sequence[NextModes]) -> list[Merged | None]:

@@ -24,7 +24,7 @@ from atg_fg.core.sense import Sense, SensedTrial
 from atg_fg.core.transactions import one_transaction
 from atg_fg.learning.evidence_learner import EvidenceLearner, SavedEvidence
 from atg_fg.learning.learner import StructureLearner
-from atg_fg.learning.milestones import next_milestone
+from atg_fg.learning.milestones import is_milestone, next_milestone
 from atg_fg.learning.raw_trials import RawTrial, Reassignment
 
 #: Nats of evidence, and least number of trials, by which one model of looks outdoes the other so that it rests.
@@ -108,13 +108,16 @@ class StructuredMemory(RobotMemory):
         trial = RawTrial(tuple(detections), tuple(actions), tuple(confidences), tuple(likelihoods), felt)
         trial.check(self.assumptions)
         before = self.gain if len(self.learner.trials) >= FIRST_TRIALS else 0.0
-        # A model that is far behind rests; it looks at all trials again whenever their number has doubled. One that is
-        # mistaken goes on: once it knows more, it may take for wrong looks what were errors of single labels before.
-        has_doubled = (len(self.learner.trials) + 1).bit_count() == 1
-        self.learner.learn(self[name].name, trial, rests=before > OUTDONE and not has_doubled)
+        # A model that is far behind rests: it looks at all trials again whenever their number has doubled, but that of
+        # sure looks merges trials at each milestone. One that is mistaken goes on: once it knows more, it may take for
+        # wrong looks what were errors of single labels before.
+        n_trials = len(self.learner.trials) + 1
+        has_doubled = n_trials.bit_count() == 1
+        rests = before > OUTDONE and not has_doubled
+        self.learner.learn(self[name].name, trial, rests=rests)
         if before > -OUTDONE or before == MISTAKEN or has_doubled:
             self.evidence.learn()
-            self._weigh(anew=before <= OUTDONE or has_doubled)
+            self._weigh(anew=not rests or is_milestone(n_trials))
             if self.erring and not taught:
                 self._mend()
         return self.learner.owners[-1]

@@ -8,12 +8,13 @@ import pytest
 
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.learning.kinds import choose_kinds
-from atg_fg.learning.learner import N_CHAINS, N_DRAWS, StructureLearner
+from atg_fg.learning.learner import N_CHAINS, StructureLearner
 from atg_fg.learning.milestones import is_milestone
 from atg_fg.learning.plain_evidence import SURE, USUAL
 from atg_fg.learning.rates import Rates
 from atg_fg.learning.raw_trials import RawTrial
 from atg_fg.learning.register_search import n_scored
+from atg_fg.learning.state_merging import N_DRAWS
 from atg_fg.storage.structure_json import read_learner, write_learner
 from atg_fg.worlds.families import hexagonal_prisms
 from tests.learning.oracle import Structure

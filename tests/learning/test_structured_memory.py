@@ -6,10 +6,10 @@ import pytest
 from atg_fg.core.errors import InvalidInputError, UnknownNameError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.patterns import Evidence
-from atg_fg.learning.structured_memory import StructuredMemory, memory_for
+from atg_fg.learning.structured_memory import OUTDONE, StructuredMemory, memory_for
 from atg_fg.storage import memory_files, memory_json
 from atg_fg.storage.presets import preset
-from tests.learning.worlds import ARCUBES, cubes, trial_of
+from tests.learning.worlds import ARCUBES, PRISM, cubes, prisms, trial_of
 
 
 def add(memory, trial, matched=None):
@@ -123,3 +123,14 @@ def test_a_malformed_section_is_refused_with_place_and_value(memory, change, mes
     with pytest.raises(InvalidInputError, match=message) as caught:
         memory_json.memory_from_json(section_changed(memory, change), "bad.json")
     assert str(caught.value).startswith("bad.json: structure")
+
+
+def test_structures_are_searched_for_at_milestones_though_the_model_in_which_looks_err_is_ahead():
+    """Of few prisms it explains more than plain ATGs do; at the next milestone trials merge."""
+    rng, memory, ahead = np.random.default_rng(3), StructuredMemory(ARCUBES), []
+    for prism in prisms(10, seed=3):
+        add(memory, trial_of(prism, 10, rng))
+        ahead.append(memory.gain > OUTDONE)
+    assert ahead[7:] == [True, True, False]
+    assert not memory.erring
+    assert memory.learner.believed([])[0].structure == PRISM
