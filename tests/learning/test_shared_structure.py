@@ -280,7 +280,10 @@ def test_a_structure_with_modes_is_kept_in_a_file():
     [
         (lambda d: d.update(modes=d["modes"][:1]), r"here\.modes: 1; expected 2 to 8 of them"),
         (lambda d: d.update(modes=d["modes"] * 9), r"here\.modes: 18; expected 2 to 8 of them"),
-        (lambda d: d["modes"][1]["next"].update(left=2), r"here\.modes\[1\]\.next\.left: 2; expected 0 to 1"),
+        (
+            lambda d: d["modes"][1]["next"].update(left=2),
+            r"modes\[1\]\.next\.left: 2; expected a whole number from 0 to 1",
+        ),
         (lambda d: d["modes"][0]["sources"].update(flip=[0]), r"here\.modes\[0\]\.sources\.flip"),
         (lambda d: d["modes"][0].pop("next"), r"here\.modes\[0\]"),
         (lambda d: d.update(sources={}), "here"),
