@@ -152,7 +152,7 @@ def own_log_evidence(
 @compiled
 def entries_used(trials: TrialArrays, clusters: Clusters, automaton: int) -> int:
     """Return how many entries of an automaton's successors its trials go through."""
-    used = np.zeros(clusters.successors.shape[1:], np.bool_)
+    used, n_used = np.zeros(clusters.successors.shape[1:], np.bool_), 0
     path = np.empty(trials.looks.shape[1], np.int64)
     for trial in range(len(trials.lengths)):
         cluster = clusters.owner[trial]
@@ -160,8 +160,9 @@ def entries_used(trials: TrialArrays, clusters: Clusters, automaton: int) -> int
             length = trials.lengths[trial]
             walk(clusters.successors[automaton], trials.actions[trial], length, clusters.start[trial], path)
             for time in range(length - 1):
+                n_used += not used[trials.actions[trial, time], path[time]]
                 used[trials.actions[trial, time], path[time]] = True
-    return int(used.sum())
+    return n_used
 
 
 @compiled_within

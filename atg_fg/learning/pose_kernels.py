@@ -337,15 +337,13 @@ def act(rows: Rows, successors: IntArray, actions: IntArray, slip: float) -> Row
     """Move each row by the action of its owner, and leave a second one behind for a slip, after all that moved."""
     owner, start, pose, weight, table, events = rows
     n_rows = len(owner)
-    moved, stayed = pose.copy(), events.copy()
+    both = np.empty(2 * n_rows, np.int64)
     for row in range(n_rows):
-        moved[row] = successors[pose[row], actions[owner[row]]]
-        stayed[row, 0] += 1.0
-    return (
-        np.concatenate((owner, owner)),
-        np.concatenate((start, start)),
-        np.concatenate((moved, pose)),
-        np.concatenate((weight * (1.0 - slip), weight * slip)),
-        np.concatenate((table, table)),
-        np.concatenate((events, stayed)),
-    )
+        both[row] = both[n_rows + row] = row
+    acted = (owner[both], start[both], pose[both], weight[both], table[both], events[both])
+    for row in range(n_rows):
+        acted[2][row] = successors[pose[row], actions[owner[row]]]
+        acted[3][row] *= 1.0 - slip
+        acted[3][n_rows + row] *= slip
+        acted[5][n_rows + row, 0] += 1.0
+    return acted

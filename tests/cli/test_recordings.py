@@ -86,7 +86,7 @@ def test_what_a_writer_that_had_no_room_left_is_a_new_memory(run, folder, left):
 
 def test_an_empty_memory_is_begun_and_each_trial_learned_before_the_next(run, folder):
     found = document(
-        run, "recognise", "first.csv", "--memory", "robot.json", "--learn", "--objects", "3", "--aspects", "6"
+        run, "recognise", "first.csv", "--memory", "robot.json", "--learn", "--objects", "3", "--preset", "default"
     )
     assert found["trials"][0]["verdict"] == "novel"
     assert found["trials"][0]["learned"] == "object-000"
@@ -135,11 +135,12 @@ def test_boxes_that_look_alike_are_told_apart_by_weight(run, refused, folder):
 
 
 def test_taught_objects_have_their_names(run, folder):
-    document(run, "learn", "first.csv", "--memory", "robot.db", "--teach", "--objects", "3", "--aspects", "6")
+    usual = ("--preset", "default")
+    document(run, "learn", "first.csv", "--memory", "robot.db", "--teach", "--objects", "3", *usual)
     memory = load_memory(folder / "robot.db")
     assert set(memory.names) == {"box-0", "box-1", "box-2"}
     assert memory.assumptions.alphabet.names == tuple(sorted(LABELS))
-    found = document(run, "recognise", "second.csv", "--memory", "robot.db")
+    found = document(run, "recognise", "second.csv", "--memory", "robot.db", *usual)
     assert found["score"]["success"]["rate"] >= 0.8
     assert {trial["matched"] for trial in found["trials"]} <= {"box-0", "box-1", "box-2", None}
 
