@@ -266,11 +266,11 @@ class TestExperiment:
     PLAN = TestPlan(engine="learned-structure", parameters=LEARNED, n_trials=12, n_actions=6)
 
     def test_it_is_the_same_after_an_interruption_and_in_any_process(self, tmp_path):
-        plan = replace(self.PLAN, n_trials=8)
+        plan = replace(self.PLAN, n_trials=5)
         whole = run_test(plan, 1, tmp_path / "whole")
 
         def stop(number, record):
-            if number == 5:
+            if number == 3:
                 raise KeyboardInterrupt
 
         with pytest.raises(KeyboardInterrupt):

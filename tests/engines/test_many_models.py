@@ -1,4 +1,4 @@
-"""Exact engines against brute force on 2,000 random models, each with a trial, at its end; on 500 by default."""
+"""Exact engines against brute force on 2,000 random models, each with a trial, at its end; on 250 by default."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import pytest
 from tests.models import gone_through, random_case
 from tests.small import ROUTES
 
-CHUNKS, QUICK_CHUNKS, CHUNK_SIZE = 16, 4, 125
+CHUNKS, QUICK_CHUNKS, CHUNK_SIZE = 16, 2, 125
 #: The routes make the whole graph anew at each question; each is given a part of the models.
 
 

@@ -22,11 +22,11 @@ def test_a_cell_is_the_test_that_its_plan_says():
 @pytest.mark.parametrize("variant", VARIANTS)
 @pytest.mark.parametrize("noise", NOISES)
 def test_every_variant_runs_under_every_noise(variant, noise):
-    cell = Cell(variant, "ideal", noise, 3)
+    cell = Cell(variant, "ideal", noise, 2)
     assert cell.plan(N_TRIALS).world_options == NOISES[noise]
     if noise == "ideal":
-        ((test,),) = run_ablation([cell], [0], 3).values()
-        assert test.success[1] == 3
+        ((test,),) = run_ablation([cell], [0], 2).values()
+        assert test.success[1] == 2
 
 
 def test_it_goes_on_where_it_was_cut_off(tmp_path):

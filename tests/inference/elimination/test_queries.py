@@ -340,10 +340,10 @@ def test_an_exported_trial_has_the_posterior_and_the_evidence_of_the_trial(seed)
 
 @pytest.mark.parametrize("task", [log_partition, marginals, most_probable_explanation])
 def test_a_model_far_too_large_is_refused_with_more_than_a_round_number(task):
-    """Random pairs of 2,000 variables with 10 states: to count all tables would itself take minutes."""
+    """Random pairs of 1,000 variables with 10 states: to count all tables would itself take minutes."""
     rng = np.random.default_rng(0)
-    pairs = [tuple(map(int, rng.choice(2000, 2, replace=False))) for _ in range(6000)]
-    model = DiscreteModel((10,) * 2000, tuple((pair, np.ones((10, 10))) for pair in pairs))
+    pairs = [tuple(map(int, rng.choice(1000, 2, replace=False))) for _ in range(3000)]
+    model = DiscreteModel((10,) * 1000, tuple((pair, np.ones((10, 10))) for pair in pairs))
     with pytest.raises(
         TooLargeError, match=r"more than 2\*\*\d+ entries \(more than 2\*\*\d+ bytes\); the limit is 6710"
     ):
