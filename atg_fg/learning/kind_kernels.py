@@ -80,9 +80,12 @@ def share_out(table: FloatArray, before: FloatArray, n_rounds: int) -> tuple[Flo
     for _ in range(n_rounds):
         expected = before.copy()
         for row in range(n_rows):
-            weight = (likelihood[row] * shares).sum()
+            weight = 0.0
             for kind in range(n_kinds):
-                following[row, kind] = likelihood[row, kind] * shares[kind] / weight
+                following[row, kind] = likelihood[row, kind] * shares[kind]
+                weight += following[row, kind]
+            for kind in range(n_kinds):
+                following[row, kind] /= weight
                 expected[kind] += following[row, kind]
         shares = expected / (total + n_rows)
     bound = math.lgamma(total) - math.lgamma(total + n_rows)

@@ -73,7 +73,8 @@ def evidence_of(
     """Return what ``map_log_evidence`` does, and add what registers showed to the histories that are known."""
     number, rows, longer, product, log_evidence, n_known = histories
     n_registers, n_slots = sources.shape[1], number.shape[2]
-    places, history = np.empty((2, n_registers), np.uint32), np.empty(n_registers, np.uint32)
+    places = np.empty((number.shape[1] + 1, n_registers), np.uint32)
+    history = np.empty(n_registers, np.uint32)
     total = 0.0
     for trial in range(len(lengths)):
         if n_known[0] + number[trial].size > len(longer):
@@ -81,12 +82,11 @@ def evidence_of(
         for register in range(n_registers):
             places[0, register], history[register] = register, 0
         for time in range(lengths[trial]):
-            if time > 0:
-                action = actions[trial, time - 1]
-                for register in range(n_registers):
-                    places[time % 2, register] = places[1 - time % 2, sources[action, register]]
+            action = actions[trial, time]
+            for register in range(n_registers):
+                places[time + 1, register] = places[time, sources[action, register]]
             for slot in range(n_slots):
-                register, row = places[time % 2, slot], number[trial, time, slot]
+                register, row = places[time, slot], number[trial, time, slot]
                 before = history[register]
                 after = longer[before, row]
                 if after == 0:
@@ -103,7 +103,7 @@ def evidence_of(
         evidence = 0.0
         for register in range(n_registers):
             evidence += log_evidence[history[register]]
-        total += np.logaddexp(evidence, plain[trial])
+        total += evidence if plain[trial] == -np.inf else np.logaddexp(evidence, plain[trial])
     return total
 
 
