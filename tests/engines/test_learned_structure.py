@@ -13,11 +13,15 @@ import pytest
 
 from atg_fg.core.errors import ImpossibleEvidenceError, InvalidInputError
 from atg_fg.core.memory import RobotMemory
+from atg_fg.core.object_sense import ObjectSense
 from atg_fg.core.patterns import Evidence
 from atg_fg.engines import begin_trial
 from atg_fg.experiments.table1 import TestPlan, run_test, run_tests
 from atg_fg.experiments.trial import run_trial
+from atg_fg.learning.believed_structure import UncertainObjects
+from atg_fg.learning.evidence_learner import BelievedChain
 from atg_fg.learning.learner import StructureLearner
+from atg_fg.learning.plain_evidence import PlainNoise
 from atg_fg.learning.rates import Rates
 from atg_fg.learning.structured_memory import StructuredMemory
 from atg_fg.policies import EntropyPolicy
@@ -205,6 +209,8 @@ def test_probabilities_sum_to_one_and_asking_changes_nothing(cube_memory):
     inference = played(cube_memory, cubes(8)[3], 3, missing=0.3)
     before = inference.identity()
     assert before.objects.sum() + before.unseen == pytest.approx(1, abs=1e-9)
+    by_aspects = inference.aspect_belief.sum(axis=1)
+    np.testing.assert_allclose(by_aspects, np.append(before.objects, before.unseen), atol=1e-4)
     entropies = inference.expected_entropies()
     assert (entropies <= before.entropy + 1e-3).all()
     for hypothesis in range(9):
@@ -246,6 +252,66 @@ def test_where_nothing_is_learned_structure_does_no_harm():
             each.observe(Evidence.of_detection(ARCUBES.alphabet, look))
         mine, yours = (each.identity() for each in engines)
         np.testing.assert_allclose(mine.objects, yours.objects, atol=0.02)
+
+
+def test_before_the_first_look_each_kind_is_as_probable_as_the_learner_says_and_asking_changes_nothing(
+    cube_memory, monkeypatch
+):
+    memory, learner = cube_memory.copy(), StructureLearner
+    (cube, *_) = memory.learner.believed(memory.names)
+    followers, members = np.linspace(0.1, 0.8, 8), np.linspace(0.3, 0.1, 8)
+    cube = cube._replace(weight=0.6, followers=followers, share=0.5)
+    uncertain = UncertainObjects(PlainNoise(1.0, 1e-3), members, 0.2)
+    state = BelievedChain(0.3, np.zeros((3, 1), int), np.array([[0, 1]]), np.full((9, 2, 12), 1 / 12), None, 0.01)
+    prior = begin_trial("bayes-filter", RobotMemory(ARCUBES, memory), preset("default")).model.prior
+    chains = [state._replace(weight=weight, log_prior=np.log(prior)) for weight in (0.3, 0.7)]
+    monkeypatch.setattr(learner, "believed", lambda self, names: [cube])
+    monkeypatch.setattr(learner, "uncertain", lambda self, names: uncertain)
+    monkeypatch.setattr(type(memory.evidence), "believed", lambda self, names: chains)
+    for gain, erring in ((-np.inf, 0.0), (math.log(0.25 / 0.75), 0.25)):
+        memory._gain = gain
+        asked, other = (begin_trial("learned-structure", memory, LEARNED) for _ in range(2))
+        of_cube, of_uncertain = 0.6 * prior @ np.append(followers, 0.5), prior @ np.append(members, 0.2)
+        expected = [(1 - erring) * each for each in (of_cube, of_uncertain, 1 - of_cube - of_uncertain)]
+        *kinds, plain = asked.kind_belief().values()
+        assert [*kinds[:2], plain] == pytest.approx(expected)
+        assert sum(kinds[2:]) == pytest.approx(erring)
+    for look in ((0, 1), (1, 2)):
+        for each in (asked, other):
+            if look == (1, 2):
+                each.act(0)
+            each.kind_belief() if each is asked else None
+            each.observe(look)
+        assert asked.kind_belief() == other.kind_belief()
+    told = asked.kind_explanations(200)
+    assert 0.5 < sum(each.probability for each in told) < 1 + 1e-9
+    for hypothesis in range(9):
+        own = sum(each.probability for each in told if each.hypothesis == hypothesis)
+        assert own <= np.append(asked.identity().objects, asked.identity().unseen)[hypothesis] + 1e-9
+
+
+def test_what_is_felt_counts_alike_for_all_kinds_of_objects():
+    felt = replace(RING_WORLD, object_senses=(ObjectSense("weight", 0.5, 0.6, 0.08),))
+    memory, rng = StructuredMemory(felt), np.random.default_rng(0)
+    for each, reading in zip(objects_of(RING, CONTENTS), (0.3, 0.6), strict=True):
+        trial = trial_of(each, 14, rng)
+        measured = [(("weight", reading),), *[()] * 14]
+        name = memory.learn(
+            [felt.alphabet.index(look) for look in trial.detections], list(trial.actions), None, measured=measured
+        )
+        memory.learn_shared(name, trial.detections, trial.actions, measured=measured)
+    learner = StructureLearner(felt)
+    learner.restore(memory.learner.owners, memory.learner.trials, [RING], Rates())
+    memory.learner, memory._gain = learner, -np.inf
+    beliefs = []
+    for reading in ((), (("weight", 0.55),)):
+        inference = begin_trial("learned-structure", memory, LEARNED)
+        likelihood = inference.model.objects.likelihood((("weight", 0.55),))
+        inference.observe(replace(Evidence.of_detection(felt.alphabet, (0, None)), measured=reading))
+        assert inference.kind_belief()["3 places, 6 poses"] > 0.5
+        beliefs.append(np.append(inference.identity().objects, inference.identity().unseen))
+    before, after = beliefs
+    np.testing.assert_allclose(after, before * likelihood / (before @ likelihood), atol=1e-9)
 
 
 def test_it_goes_through_a_trial_with_a_world_and_a_policy(cube_memory):

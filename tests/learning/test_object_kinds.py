@@ -5,6 +5,7 @@ import pytest
 
 from atg_fg.core.memory import RobotMemory
 from atg_fg.engines import begin_trial
+from atg_fg.learning.learner import StructureLearner
 from atg_fg.learning.object_kinds import kinds_of
 from atg_fg.learning.structured_memory import StructuredMemory
 from atg_fg.storage.presets import preset
@@ -35,6 +36,14 @@ def test_each_kind_has_its_members_and_says_what_it_is_like(memory):
     assert plain.words == "a graph of its own"
     assert sum(kind.share for kind in (cube, unsure, plain)) == pytest.approx(1.0)
     np.testing.assert_allclose(sum(kind.probabilities for kind in (cube, unsure, plain)), 1.0)
+
+
+def test_a_kind_is_as_probable_as_the_sets_that_it_is_in(memory, monkeypatch):
+    (cube,) = memory.learner.believed(memory.names)
+    monkeypatch.setattr(StructureLearner, "believed", lambda self, names: [cube._replace(weight=0.4)])
+    told = kinds_of(memory)[0]
+    np.testing.assert_allclose(told.probabilities, 0.4 * cube.followers)
+    assert (told.share, told.members) == (pytest.approx(0.4 * cube.share), ())
 
 
 def test_where_nothing_was_learned_all_are_plain():

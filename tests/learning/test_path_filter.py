@@ -143,6 +143,7 @@ def test_contents_are_what_was_known_of_that_object_times_what_was_seen(chain, n
 def test_a_look_is_predicted_as_probable_as_it_then_is_and_a_copy_goes_on_alone(chain, noise):
     filtered = filtered_through(chain, noise, 3)
     before = filtered.log_evidence.copy()
+    filtered.copy().observe(LOOKS[0])
     owners, predicted = filtered.predicted_patterns()
     for action in range(2):
         then = np.zeros((3, 9))

@@ -84,6 +84,13 @@ def test_the_monoid_of_contents_that_move_up_by_hand():
     assert poses.first_weights.tolist() == pytest.approx([1 / 3] * 3)
 
 
+def test_a_class_is_as_probable_as_it_has_poses():
+    # Two places are exchanged, or what is in the third comes into all: then other names make no difference.
+    poses = SharedStructure(1, ((1, 0, 2), (2, 2, 2))).poses()
+    assert poses.registers.tolist() == [[0, 1, 2], [1, 0, 2], [2, 2, 2]]
+    assert poses.first_weights.tolist() == pytest.approx([2 / 3, 1 / 3])
+
+
 def test_a_box_has_poses_with_its_lid_on_and_off_but_no_way_back():
     poses = BOX.poses()
     assert len(poses.registers) == 4
@@ -243,6 +250,21 @@ def test_a_map_that_is_alike_in_both_modes_costs_little():
     tied = SharedStructure(2, (*RING.sources, *RING.sources), ((1, 0), (0, 1)))
     assert tied.log_prior > RING.log_prior + math.log(2 * 0.2 / 2**4 * 0.5**2) - 1e-9
     assert tied.log_prior < RING.log_prior
+
+
+def test_the_prior_of_two_modes_that_share_some_maps_by_hand():
+    # One map is tied, and names the hidden registers of the second mode; the other is one of 3!.
+    mixed = SharedStructure(1, ((1, 2, 0), (1, 0, 2), (1, 2, 0), (0, 1, 2)), ((1, 0), (0, 1)))
+    maps = 0.15**2 * (0.5 + 0.5 * 0.15) * 0.5 * 0.15
+    assert mixed.log_prior == pytest.approx(math.log(2 / 2**2 * 2 * 0.2 / 2**4 * maps))
+
+
+def test_poses_that_look_alike_until_one_of_the_actions_tells_them_apart_are_two():
+    # The second action goes into a mode in which the third one no longer exchanges what is in view with what is not.
+    modes = SharedStructure(1, ((0, 1), (0, 1), (1, 0), (0, 1), (0, 1), (0, 1)), ((0, 1, 0), (1, 1, 1)))
+    poses = modes.poses()
+    assert poses.registers[:, 0].tolist() == [0, 0, 1, 1]
+    assert poses.successors.tolist() == [[0, 1, 2], [1, 1, 1], [2, 3, 0], [3, 3, 3]]
 
 
 def test_modes_that_are_alike_make_no_more_poses():
