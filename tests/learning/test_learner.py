@@ -208,6 +208,10 @@ def test_in_whatever_order_objects_are_asked_for_each_has_its_own_contents():
         assert sorted(own.argmax(axis=1).tolist()) == sorted(contents[int(name)])
     np.testing.assert_array_equal(again.contents[[0, 2]], best.contents[[2, 0]])
     np.testing.assert_array_equal(again.followers[[0, 2]], best.followers[[2, 0]])
+    of_plain = choose_kinds([], learner._of_plain(), trials)[0].log_evidence
+    assert learner.gain == pytest.approx(learner.log_evidence - of_plain)
+    learner.settle()
+    assert learner.rates.share == pytest.approx((1 + 3) / (2 + 3), abs=0.005)
 
 
 def test_sets_of_kinds_are_believed_in_by_their_evidence_and_followers_are_those_of_the_set():

@@ -10,7 +10,7 @@ from atg_fg.learning.likelihood import score_trials
 from atg_fg.learning.rates import Rates
 from atg_fg.learning.raw_trials import RawTrial
 from atg_fg.learning.structure_repair import follows, repairs
-from tests.learning.worlds import ARCUBES, CUBE, NEVER, PRISM, cubes, prisms, trial_of
+from tests.learning.worlds import ARCUBES, CUBE, NEVER, PRISM, RING, cubes, prisms, trial_of
 
 KINDS = {"cube": (CUBE, cubes), "prism": (PRISM, prisms)}
 
@@ -52,6 +52,18 @@ def test_any_two_entries_that_were_exchanged_are_put_back(kind, seed):
     wrong, trials = exchanged(structure, number, one, two), trials_of(make, 40, seed)
     contradicting = next(trial for trial in trials if not follows(trial, wrong))
     assert repairs(wrong, contradicting, trials)[0] == structure
+
+
+def test_a_register_holds_one_symbol_and_a_symbol_is_in_one_register():
+    turned = [RawTrial(((0, 1), look), (0,)) for look in ((1, 2), (1, 0), (2, 3))]
+    assert [follows(trial, RING) for trial in turned] == [True, False, False]
+
+
+def test_what_no_more_trials_follow_is_no_repair():
+    wrong, trials = exchanged(CUBE, 1, 2, 4), trials_of(cubes, 10)
+    contradicting = next(trial for trial in trials if not follows(trial, wrong))
+    assert repairs(wrong, contradicting, [contradicting])[0] != wrong
+    assert repairs(wrong, contradicting, []) == []
 
 
 def test_what_is_right_is_not_repaired():
