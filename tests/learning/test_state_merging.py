@@ -1,15 +1,18 @@
 """Structures read off from trials that merge."""
 
+import itertools
+
 import numpy as np
 import pytest
 
+from atg_fg.learning import state_merging
 from atg_fg.learning.kernels import TrialArrays
 from atg_fg.learning.map_kernels import anneal_maps, map_log_evidence
 from atg_fg.learning.merging_kernels import Automaton, add, unite
 from atg_fg.learning.raw_trials import RawTrial, Recording
 from atg_fg.learning.shared_structure import is_permutation
+from atg_fg.learning.state_merging import Merged, mode_automata
 from atg_fg.learning.state_merging import merge_states as merge_into
-from atg_fg.learning.state_merging import mode_automata
 from tests.learning.worlds import CUBE, PRISM, PRISM_MODES, RING, cubes, objects_of, prisms, random_objects, trial_of
 
 ONE_MODE = ((0, 0, 0),)
@@ -130,3 +133,11 @@ def test_mode_automata_are_all_up_to_the_names_of_modes():
     assert len(found) == len(set(found))
     assert ((0, 1), (1, 0)) in found or ((1, 0), (0, 1)) in found
     assert ((0, 0), (1, 1)) not in found
+
+
+def test_of_what_draws_merge_into_the_best_is_what_most_trials_follow_and_then_the_most_probable(monkeypatch):
+    found = itertools.cycle([Merged(RING, 3), Merged(PRISM, 9), Merged(CUBE, 9), None, Merged(CUBE, 4)])
+    monkeypatch.setattr(state_merging, "merge_states", lambda trials, automata: [next(found)])
+    merged, n_tried = state_merging.merged_draws(trials_of(cubes(12)), 3, np.random.default_rng(0))
+    assert merged == [CUBE, PRISM, RING]
+    assert n_tried == sum(state_merging.N_DRAWS)  # nine of twelve trials are not yet most
