@@ -1,4 +1,7 @@
-"""This project's own code of another revision, timed round by round beside the present one."""
+"""This project's own code of another revision, timed round by round beside the present one.
+
+``python -m benchmarks.against REVISION WORD`` times those figures alone whose claim has a word, such as ``learned``.
+"""
 
 from __future__ import annotations
 
@@ -70,7 +73,7 @@ FIGURES: Final = (
         ("test", {"engine": "learned-structure", "parameters": "learned", "n_trials": 100}),
         "seconds",
         3,
-        1,
+        3,
     ),
     Figure(
         "Figure 3 with four tests a point, two processes",
@@ -203,3 +206,8 @@ def peak_bytes(n_objects: int) -> float:
     with Side(Path(sys.executable)) as side:
         side.turn(*_trial("bayes-filter", "default", n_objects))
         return side.turn("peak", {})["bytes"]
+
+
+if __name__ == "__main__":
+    for row in measure(sys.argv[1], tuple(each for each in FIGURES if sys.argv[2] in each.claim))["figures"]:
+        print(row["claim"], row["times_as_quick"], "times as quick; ms:", row["milliseconds"])
