@@ -29,29 +29,23 @@ from atg_fg.learning.structure_repair import follows, repairs
 #: A structure is settled if it is this many nats better than none.
 SETTLED_GAIN: Final = 50.0
 
-
 #: A structure that takes this share of looks and symbols for errors is in doubt, however much it explains.
 DOUBTFUL_ERRORS: Final = 0.02
-
 
 #: Structures that are kept up, and how many nats they may be behind the best.
 MAX_CANDIDATES: Final = 5
 KEPT_WITHIN: Final = 10.0
 
-
 #: Proposals of a search that are scored on all trials.
 MAX_PROPOSALS: Final = 4
-
 
 #: Annealing: chains for each number of registers, and probability of a wrong label.
 N_CHAINS: Final = 3
 WRONG_LABEL: Final = 0.01
 
-
 #: Trials that no structure explains are merged if there are this many, and this share of all.
 LEAST_UNEXPLAINED: Final = 6
 UNEXPLAINED_SHARE: Final = 0.1
-
 
 #: Rates that differ by less than this factor are as good as the same.
 RATE_FACTOR: Final = 1.25
@@ -85,6 +79,8 @@ class StructureLearner:
         self._candidates: list[Candidate] = []
         self._chosen: list[KindSet] = []
         self._n_chosen_from = -1
+        #: what ``_members`` found of all objects under each of the chosen sets of kinds
+        self._kinds_of_objects: dict[tuple[int, ...], FloatArray] = {}
 
     def learn(self, owner: str, trial: RawTrial, *, rests: bool = False) -> None:
         """Learn from one more trial.
@@ -237,13 +233,15 @@ class StructureLearner:
         Of an object without a raw trial no structure is known to say anything.
         """
         shares = kinds.trials.shares
-        chosen = [self._candidates[number] for number in kinds.structures]
-        by_trial = kind_table(chosen, self._plain.of_kinds(self.noise, met_again=True), self.trials)
-        by_object = np.zeros((len(self._objects), len(shares)))
-        np.add.at(by_object, self._owner_indices, by_trial)
-        by_object += np.log(shares)
-        by_object = np.exp(by_object - by_object.max(axis=1, keepdims=True))
-        by_object /= by_object.sum(axis=1, keepdims=True)
+        if kinds.structures not in self._kinds_of_objects:
+            chosen = [self._candidates[number] for number in kinds.structures]
+            by_trial = kind_table(chosen, self._plain.of_kinds(self.noise, met_again=True), self.trials)
+            by_object = np.zeros((len(self._objects), len(shares)))
+            np.add.at(by_object, self._owner_indices, by_trial)
+            by_object += np.log(shares)
+            by_object = np.exp(by_object - by_object.max(axis=1, keepdims=True))
+            self._kinds_of_objects[kinds.structures] = by_object / by_object.sum(axis=1, keepdims=True)
+        by_object = self._kinds_of_objects[kinds.structures]
         of = np.zeros((len(names) + 1, len(shares)))
         of[-1] = shares
         for position, name in enumerate(names):
@@ -354,7 +352,7 @@ class StructureLearner:
 
     def _choose(self) -> None:
         """Choose the sets of kinds among the candidates."""
-        self._n_chosen_from = len(self.trials)
+        self._n_chosen_from, self._kinds_of_objects = len(self.trials), {}
         if not self._can_explain:
             return
         self._plain.catch_up(self.trials, self.owners)

@@ -233,8 +233,9 @@ class PoseFilter:
         weight, table = self.rows.weight[own], self.rows.table[own]
         best = int(weight.argmax())
         if weight[best] > (0.5 + EVEN) * weight.sum():
-            table, weight = table[[best]], np.ones(1)
-        mean: FloatArray = np.einsum("r,rps->ps", weight / weight.sum(), self._contents[table])
+            mean: FloatArray = self._contents[table[best]].copy()
+        else:
+            mean = np.einsum("r,rps->ps", weight / weight.sum(), self._contents[table])
         return mean
 
     def expected_events(self) -> FloatArray:

@@ -47,20 +47,19 @@ def search_registers(
     newest = slice(max(len(plain) - N_TRIALS, 0), None)
     rest = np.ascontiguousarray(plain[newest])
     window = TrialArrays(trials.looks[newest], trials.actions[newest], trials.lengths[newest])
+    cooling, cooling_again = np.geomspace(HOTTEST, 1.0, N_SWEEPS), np.geomspace(HOTTEST_COPYING, 1.0, N_COPYING_SWEEPS)
     found: list[SharedStructure] = []
     for n_registers in range(n_slots, n_slots + MAX_HIDDEN + 1):
         best, best_sources = -np.inf, np.zeros((0, 0), dtype=np.int64)
         for _ in range(n_chains):
             sources = np.array([rng.permutation(n_registers) for _ in range(n_actions)])
-            coldness = np.geomspace(HOTTEST, 1.0, N_SWEEPS)
-            score = map_kernels.anneal_maps(window, rest, sources, n_slots, prior, coldness, False, 0.0, rng)
+            score = map_kernels.anneal_maps(window, rest, sources, n_slots, prior, cooling, False, 0.0, rng)
             found.append(_structure(n_slots, sources))
             if score > best:
                 best, best_sources = score, sources
         permutation, other = log_map_priors(n_registers)
-        sources, coldness = best_sources.copy(), np.geomspace(HOTTEST_COPYING, 1.0, N_COPYING_SWEEPS)
-        cost = permutation - other
-        map_kernels.anneal_maps(window, rest, sources, n_slots, prior, coldness, True, cost, rng)
+        sources, cost = best_sources.copy(), permutation - other
+        map_kernels.anneal_maps(window, rest, sources, n_slots, prior, cooling_again, True, cost, rng)
         found.append(_structure(n_slots, sources))
 
     def score_of(structure: SharedStructure) -> float:
