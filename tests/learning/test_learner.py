@@ -201,8 +201,8 @@ def test_trials_that_change_hands_are_learned_from_as_if_they_had_always_been_of
 def test_in_whatever_order_objects_are_asked_for_each_has_its_own_contents():
     contents = [(0, 1, 2), (3, 4, 0), (2, 0, 4)]
     rng, learner = np.random.default_rng(0), StructureLearner(RING_WORLD)
-    trials = [trial_of(each, 12, rng) for each in objects_of(RING, contents)]
-    learner.restore(["0", "1", "2"], trials, [RING], Rates())
+    trials = [trial_of(each, 12, rng) for each in objects_of(RING, contents * 2)]
+    learner.restore(["0", "1", "2"] * 2, trials, [RING], Rates())
     (best, *_), (again, *_) = learner.believed(["0", "1", "2"]), learner.believed(["2", "nobody", "0"])
     for name, own in zip("012", best.contents, strict=True):
         assert sorted(own.argmax(axis=1).tolist()) == sorted(contents[int(name)])
