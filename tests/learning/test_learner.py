@@ -212,6 +212,7 @@ def test_in_whatever_order_objects_are_asked_for_each_has_its_own_contents():
     assert learner.gain == pytest.approx(learner.log_evidence - of_plain)
     learner.settle()
     assert learner.rates.share == pytest.approx((1 + 3) / (2 + 3), abs=0.005)
+    assert learner.rates.slip == pytest.approx(1 / (100 + 6 * 12), rel=0.02)
 
 
 def test_sets_of_kinds_are_believed_in_by_their_evidence_and_followers_are_those_of_the_set():
@@ -287,6 +288,7 @@ def test_objects_whose_actions_are_uncertain_are_a_kind_of_their_own(unsure):
     assert (uncertain.members[3:] > 0.5).mean() > 0.8
     assert uncertain.share > 0.3
     assert uncertain.noise.concentration >= 0.3
+    assert unsure._unexplained() == list(range(1, 24, 2))
 
 
 def plain_atg(before, trial, noise):
