@@ -6,7 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from atg_fg.core.patterns import FloatArray, PatternAlphabet
+from atg_fg.core.assumptions import Assumptions
+from atg_fg.core.patterns import FloatArray
 from atg_fg.learning.likelihood import TrialScores, score_trials
 from atg_fg.learning.rates import Rates, Tally
 from atg_fg.learning.raw_trials import RawTrial
@@ -18,24 +19,25 @@ class Candidate:
 
     Args:
         structure: In canonical form.
-        alphabet: The patterns.
+        assumptions: |O| and the patterns.
 
     Attributes:
-        log_evidence: ln p(trial | structure, a fresh object), shape [n].
+        log_evidence: ln p(trial | structure) given ``NEW``, ``FILED`` and ``BEFORE``, shape [3, n]. The last sums over
+            the object that a trial is filed under and a new one alone.
         events: Expected slips, wrong looks, repeated symbols and revealed registers of each trial, shape [n, 4].
         contents: What is known of each object, each of shape [P, S].
     """
 
-    def __init__(self, structure: SharedStructure, alphabet: PatternAlphabet) -> None:
+    def __init__(self, structure: SharedStructure, assumptions: Assumptions) -> None:
         self.structure = structure
-        self._alphabet = alphabet
-        self.log_evidence: FloatArray = np.zeros(0)
-        self.events: FloatArray = np.zeros((0, 4))
-        self.contents: list[FloatArray] = []
+        self._alphabet, self._n_objects = assumptions.alphabet, assumptions.n_objects
+        self.forget()
 
     def forget(self) -> None:
         """Have all trials scored anew, and the contents of all objects learned anew."""
-        self.log_evidence, self.events, self.contents = np.zeros(0), np.zeros((0, 4)), []
+        self.log_evidence: FloatArray = np.zeros((3, 0))
+        self.events: FloatArray = np.zeros((0, 4))
+        self.contents: list[FloatArray] = []
 
     def catch_up(self, trials: Sequence[RawTrial], owners: Sequence[int], rates: Rates) -> None:
         """Score the trials that are not scored yet, and learn from them what their objects contain.
@@ -45,25 +47,43 @@ class Candidate:
             owners: Index of the object of each; a new object has the next index.
             rates: Those in force.
         """
-        n_before = len(self.log_evidence)
+        n_before, n_known = len(self.events), len(self.contents)
         if n_before == len(trials):
             return
-        new, by_owner = trials[n_before:], dict[int, list[RawTrial]]()
-        for owner, trial in zip(owners[n_before:], new, strict=True):
-            by_owner.setdefault(owner, []).append(trial)
-        fresh = np.zeros((len(new), self.structure.n_registers, self._alphabet.n_symbols))
-        met = [owner for owner in by_owner if owner < len(self.contents)]
+        new, by_owner = trials[n_before:], dict[int, list[int]]()
+        for number, owner in enumerate(owners[n_before:]):
+            by_owner.setdefault(owner, []).append(number)
+        nothing = np.zeros((len(new), self.structure.n_registers, self._alphabet.n_symbols))
+        met = [owner for owner in by_owner if owner < n_known]
         # All trials as those of fresh objects, and the first ones of objects that were met before as theirs.
-        scores = self._learn(met, [*new, *(by_owner[owner][0] for owner in met)], fresh, rates)
-        self.log_evidence = np.concatenate((self.log_evidence, scores.log_evidence[: len(new)]))
-        self.events = np.concatenate((self.events, scores.events[: len(new)]))
+        scores = self._learn(met, [*new, *(new[by_owner[owner][0]] for owner in met)], nothing, rates)
+        fresh = scores.log_evidence[: len(new)]
+        filed = fresh.copy()
+        filed[[by_owner[owner][0] for owner in met]] = scores.log_evidence[len(new) :]
         for owner, contents in zip(owners[n_before:], scores.contents, strict=False):
             if owner == len(self.contents):
                 self.contents.append(contents)
         # The second trials of all objects at once, then the third, …
         for rank in range(1, max(map(len, by_owner.values()))):
             again = [owner for owner, numbers in by_owner.items() if len(numbers) > rank]
-            self._learn(again, [by_owner[owner][rank] for owner in again], fresh[:0], rates)
+            numbers = [by_owner[owner][rank] for owner in again]
+            filed[numbers] = self._learn(again, [new[number] for number in numbers], nothing[:0], rates).log_evidence
+        self.log_evidence = np.concatenate((self.log_evidence, self._given(fresh, filed, owners)), axis=1)
+        self.events = np.concatenate((self.events, scores.events[: len(new)]))
+
+    def _given(self, fresh: FloatArray, filed: FloatArray, owners: Sequence[int]) -> FloatArray:
+        """Return the evidence of the newest trials by what is given, shape [3, len(fresh)].
+
+        An object is the one that the trial is filed under, or any that was not met yet, each as probable.
+        """
+        n_met = np.array(
+            [max(owners[:number], default=-1) + 1 for number in range(len(owners) - len(fresh), len(owners))]
+        )
+        n_objects = np.maximum(self._n_objects, n_met + 1)
+        of_new = np.log(n_objects - n_met) + fresh
+        is_new = np.array(owners[-len(fresh) :]) == n_met
+        before = np.where(is_new, of_new, np.logaddexp(of_new, filed)) - np.log(n_objects)
+        return np.array([fresh, filed, before])
 
     def _learn(self, owners: Sequence[int], trials: Sequence[RawTrial], fresh: FloatArray, rates: Rates) -> TrialScores:
         """Score trials of fresh objects, and then of known ones, whose contents are learned from these."""

@@ -1,7 +1,7 @@
 """Kinds of objects: each is a plain ATG, one whose actions are uncertain, or a follower of one of K structures.
 
 Which kind an object is of is a variable of its own, with a Dirichlet prior over the shares of the kinds. Sets of
-structures are compared by their evidence of all trials, each taken for one of a fresh object.
+structures are compared by their evidence of all trials, each given those before it.
 """
 
 from __future__ import annotations
@@ -13,6 +13,7 @@ import numpy as np
 
 from atg_fg.core.patterns import FloatArray
 from atg_fg.learning.candidate import Candidate
+from atg_fg.learning.likelihood import BEFORE
 from atg_fg.learning.pose_filter import SLIP, WRONG
 from atg_fg.learning.raw_trials import RawTrial
 
@@ -68,13 +69,16 @@ class KindSet(NamedTuple):
     trials: KindShares
 
 
-def kind_table(kinds: Sequence[Candidate], plain: FloatArray, trials: Sequence[RawTrial]) -> FloatArray:
-    """Return ln p(trial | kind, a fresh object), the two plain kinds first, shape [n, 2 + K].
+def kind_table(
+    kinds: Sequence[Candidate], plain: FloatArray, trials: Sequence[RawTrial], given: int = BEFORE
+) -> FloatArray:
+    """Return ln p(trial | kind), the two plain kinds first, shape [n, 2 + K].
 
     Args:
         kinds: K structures, scored on all trials.
         plain: ln p(trial | plain) of the two plain kinds, shape [n, 2].
         trials: All raw trials, of which too many errors are none of a kind's.
+        given: What the evidence is given.
     """
     n_looks = np.array([len(trial.detections) for trial in trials])
     columns, most = [plain], plain.max(axis=1)
@@ -83,7 +87,8 @@ def kind_table(kinds: Sequence[Candidate], plain: FloatArray, trials: Sequence[R
         errs = (wrong > WRONG_LIMIT[0] + WRONG_LIMIT[1] * n_looks) | (
             events > EVENT_LIMIT[0] + EVENT_LIMIT[1] * n_looks
         )
-        columns.append(np.where(errs, np.minimum(kind.log_evidence, most - REFUSED), kind.log_evidence))
+        evidence = kind.log_evidence[given]
+        columns.append(np.where(errs, np.minimum(evidence, most - REFUSED), evidence))
     return np.column_stack(columns)
 
 

@@ -18,6 +18,7 @@ from atg_fg.core.patterns import MISSING, FloatArray
 from atg_fg.learning.believed_structure import BelievedStructure, UncertainObjects
 from atg_fg.learning.candidate import Candidate
 from atg_fg.learning.kinds import N_PLAIN, UNCERTAIN_KIND, KindSet, choose_kinds, kind_table, share_kinds
+from atg_fg.learning.likelihood import FILED, NEW
 from atg_fg.learning.milestones import is_milestone
 from atg_fg.learning.plain_evidence import USUAL, PlainEvidence, PlainNoise
 from atg_fg.learning.rates import Rates, Tally, estimate_rates
@@ -119,7 +120,7 @@ class StructureLearner:
         for owner, trial in zip(owners, trials, strict=True):
             self._append(owner, trial)
         self.rates, self.noise = rates, noise
-        self._candidates = [Candidate(structure, self.assumptions.alphabet) for structure in structures]
+        self._candidates = [Candidate(structure, self.assumptions) for structure in structures]
 
     def settle(self) -> None:
         """Keep the best of the structures at hand, best first, and estimate the rates: trials were put together."""
@@ -184,8 +185,12 @@ class StructureLearner:
 
     @property
     def log_evidence(self) -> float:
-        """Ln p(all trials, each of a fresh object) of the best set of kinds, its prior included."""
-        return self._sets[0].log_evidence if self._sets else 0.0
+        """Ln p(all trials, each of an object never met) of the best set of kinds, its prior included."""
+        if not self._sets:
+            return 0.0
+        chosen = [self._candidates[number] for number in self._sets[0].structures]
+        fresh = kind_table(chosen, self._plain.of_kinds(self.noise, NEW), self.trials, NEW)
+        return share_kinds(fresh).log_evidence + sum(each.structure.log_prior for each in chosen)
 
     def believed(self, names: Sequence[str]) -> list[BelievedStructure]:
         """Return the structures that are believed in, best first, for objects with these names.
@@ -235,7 +240,7 @@ class StructureLearner:
         shares = kinds.trials.shares
         if kinds.structures not in self._kinds_of_objects:
             chosen = [self._candidates[number] for number in kinds.structures]
-            by_trial = kind_table(chosen, self._plain.of_kinds(self.noise, met_again=True), self.trials)
+            by_trial = kind_table(chosen, self._plain.of_kinds(self.noise, FILED), self.trials, FILED)
             by_object = np.zeros((len(self._objects), len(shares)))
             np.add.at(by_object, self._owner_indices, by_trial)
             by_object += np.log(shares)
@@ -284,7 +289,7 @@ class StructureLearner:
         looks = np.where(labels == MISSING, 1.0, shown)
         found = register_search.search_registers(
             kernels.TrialArrays(looks, recording.actions, recording.lengths),
-            np.logaddexp.reduce(self._of_plain()[numbers], axis=1),
+            np.logaddexp.reduce(self._plain.of_kinds(self.noise, NEW)[numbers], axis=1),
             len(alphabet.slots),
             n_actions,
             N_CHAINS,
@@ -327,7 +332,7 @@ class StructureLearner:
     def _add(self, structures: Sequence[SharedStructure]) -> None:
         for structure in structures:
             if structure not in self.candidates and structure.is_believable:
-                self._candidates.append(Candidate(structure, self.assumptions.alphabet))
+                self._candidates.append(Candidate(structure, self.assumptions))
         self._select()
 
     def _select(self) -> None:

@@ -14,6 +14,10 @@ from atg_fg.learning.rates import Rates
 from atg_fg.learning.raw_trials import RawTrial, TrialArrays, side_by_side
 from atg_fg.learning.shared_structure import SharedStructure
 
+#: What a trial's evidence is given: an object never met, the object that it is filed under, or all trials before it,
+#: its object summed out.
+NEW, FILED, BEFORE = range(3)
+
 
 class TrialScores(NamedTuple):
     """What N trials say under a structure.

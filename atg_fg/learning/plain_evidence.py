@@ -18,6 +18,7 @@ from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, FloatArray, IntArray
+from atg_fg.learning.likelihood import BEFORE
 from atg_fg.learning.raw_trials import RawTrial
 
 
@@ -57,9 +58,8 @@ class PlainEvidence:
         assumptions: |O|, |G|, actions and alphabet.
 
     Attributes:
-        fresh: ln p(trial | an object never met), sure first, then each of ``UNCERTAIN``, shape [n, 1 + N].
-        own: ln p(trial | the object that it is filed under), the same.
-        summed: ln p(trial | all trials before it), its object summed out, the same.
+        log_evidence: ln p(trial) given ``NEW``, ``FILED`` and ``BEFORE``, sure first, then each of ``UNCERTAIN``, shape
+            [3, n, 1 + N].
     """
 
     def __init__(self, assumptions: Assumptions) -> None:
@@ -69,16 +69,16 @@ class PlainEvidence:
     def forget(self) -> None:
         """Know no trial."""
         self._graphs: dict[str, AspectTransitionGraph] = {}
-        self.fresh, self.own, self.summed = (np.zeros((0, 1 + len(UNCERTAIN))) for _ in range(3))
+        self.log_evidence: FloatArray = np.zeros((3, 0, 1 + len(UNCERTAIN)))
 
     def catch_up(self, trials: Sequence[RawTrial], owners: Sequence[str]) -> None:
         """Take in those of all raw trials that are not known yet."""
-        rows = [self._take_in(trials[number], owners[number]) for number in range(len(self.fresh), len(trials))]
+        n_before = self.log_evidence.shape[1]
+        rows = [self._taken_in(*each) for each in zip(trials[n_before:], owners[n_before:], strict=True)]
         if rows:
-            tables = zip((self.fresh, self.own, self.summed), zip(*rows, strict=True), strict=True)
-            self.fresh, self.own, self.summed = (np.vstack((table, *new)) for table, new in tables)
+            self.log_evidence = np.concatenate((self.log_evidence, np.stack(rows, axis=1)), axis=1)
 
-    def _take_in(self, trial: RawTrial, owner: str) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _taken_in(self, trial: RawTrial, owner: str) -> FloatArray:
         alphabet = self._assumptions.alphabet
         looks = [Evidence.of_detection(alphabet, detection) for detection in trial.detections]
         patterns = [look.pattern for look in looks]
@@ -87,12 +87,12 @@ class PlainEvidence:
         fresh = of_each[:, -1]
         n_objects = max(self._assumptions.n_objects, len(self._graphs) + 1)
         weights = np.append(np.zeros(len(rivals)), math.log(n_objects - len(self._graphs))) - math.log(n_objects)
-        summed = np.logaddexp.reduce(of_each + weights, axis=1)
-        own = of_each[:, rivals.index(owner)] if owner in rivals else fresh
+        before = np.logaddexp.reduce(of_each + weights, axis=1)
+        filed = of_each[:, rivals.index(owner)] if owner in rivals else fresh
         if owner not in self._graphs:
             self._graphs[owner] = AspectTransitionGraph(owner, self._assumptions)
         self._graphs[owner].learn(patterns, trial.actions)
-        return fresh, own, summed
+        return np.array([fresh, filed, before])
 
     def _rivals(self, patterns: set[int | None], owner: str) -> list[str]:
         """Return the names of the ATGs that a trial may be of; with others it shares next to nothing."""
@@ -120,19 +120,14 @@ class PlainEvidence:
         )
         return result
 
-    def of_kinds(self, noise: PlainNoise, *, met_again: bool = False) -> FloatArray:
-        """Return ln p(trial | sure), ln p(trial | uncertain) to be held against evidence of fresh objects, [n, 2].
-
-        Which of the two it is, is said by what came before it; how probable it is as one of either, by itself.
+    def of_kinds(self, noise: PlainNoise, given: int = BEFORE) -> FloatArray:
+        """Return ln p(trial | sure), ln p(trial | uncertain), shape [n, 2].
 
         Args:
             noise: Of objects whose actions are uncertain.
-            met_again: Whether a trial is known to be of the object that it is filed under.
+            given: What the evidence is given.
         """
-        columns = [0, 1 + UNCERTAIN.index(noise)]
-        fresh, given = self.fresh[:, columns], (self.own if met_again else self.summed)[:, columns]
-        level = np.logaddexp.reduce(fresh, axis=1) - np.logaddexp.reduce(given, axis=1)
-        table: FloatArray = given + level[:, None]
+        table: FloatArray = self.log_evidence[given][:, [0, 1 + UNCERTAIN.index(noise)]]
         return table
 
     def best_noise(self, uncertain: FloatArray) -> PlainNoise:
@@ -141,4 +136,4 @@ class PlainEvidence:
         Args:
             uncertain: Probability of each trial to be of such an object, shape [n].
         """
-        return UNCERTAIN[int((uncertain @ self.summed[:, 1:] - _COSTS).argmax())]
+        return UNCERTAIN[int((uncertain @ self.log_evidence[BEFORE][:, 1:] - _COSTS).argmax())]

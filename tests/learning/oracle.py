@@ -75,8 +75,23 @@ class Structure:
 
     def fresh(self, looks: Sequence[Detection], actions: Sequence[int]) -> Fraction:
         """p(looks | actions) for an object of which nothing is known."""
-        everything = self.all_contents()
-        return sum((self.probability(each, looks, actions) for each in everything), Fraction(0)) / len(everything)
+        return self.again([], looks, actions)
+
+    def again(
+        self,
+        before: Sequence[tuple[Sequence[Detection], Sequence[int]]],
+        looks: Sequence[Detection],
+        actions: Sequence[int],
+    ) -> Fraction:
+        """p(looks | actions, these looks and actions before) for one object."""
+        total, explained = Fraction(0), Fraction(0)
+        for contents in self.all_contents():
+            weight = Fraction(1)
+            for each in before:
+                weight *= self.probability(contents, *each)
+            total += weight
+            explained += weight * self.probability(contents, looks, actions) if weight else 0
+        return explained / total
 
 
 def agrees(look: Detection, pattern: Sequence[int]) -> bool:

@@ -52,7 +52,7 @@ def test_shares_are_those_that_the_rows_say():
 def scored(structures, objects, seed=0, n_actions=10):
     rng = np.random.default_rng(seed)
     trials = [trial_of(each, n_actions, rng) for each in objects]
-    pool = [Candidate(structure, ARCUBES.alphabet) for structure in structures]
+    pool = [Candidate(structure, ARCUBES) for structure in structures]
     for each in pool:
         each.catch_up(trials, range(len(trials)), Rates())
     plain = PlainEvidence(ARCUBES)
@@ -98,7 +98,7 @@ def test_a_structure_that_errs_a_little_in_each_trial_is_no_kind():
 def test_sets_that_explain_nearly_as_much_are_believed_in_too():
     pool, plain, trials = scored([CUBE], cubes(2), n_actions=3)
     gain = choose_kinds(pool, plain, trials)[0].log_evidence - share_kinds(plain).log_evidence
-    pool[0].log_evidence[0] -= max(gain - 2.0, 0.0) if gain > 0 else 0.0
+    pool[0].log_evidence[:, 0] -= max(gain - 2.0, 0.0) if gain > 0 else 0.0
     sets = choose_kinds(pool, plain, trials)
     assert {each.structures for each in sets} == {(0,), ()}
     assert sets[0].log_evidence >= sets[1].log_evidence > sets[0].log_evidence - 7
@@ -106,9 +106,9 @@ def test_sets_that_explain_nearly_as_much_are_believed_in_too():
 
 def pool_of(tables, structures, wrong=None):
     """Structures that explain trials of eleven looks as they are told to, none of them in another way."""
-    pool = [Candidate(structure, ARCUBES.alphabet) for structure in structures]
+    pool = [Candidate(structure, ARCUBES) for structure in structures]
     for number, (each, log_evidence) in enumerate(zip(pool, tables, strict=True)):
-        each.log_evidence, each.events = np.array(log_evidence, dtype=float), np.zeros((len(log_evidence), 4))
+        each.log_evidence, each.events = np.tile(log_evidence, (3, 1)), np.zeros((len(log_evidence), 4))
         if wrong is not None:
             each.events[:, WRONG] = wrong[number]
     return pool, [RawTrial(((0, 1),) * 11, (0,) * 10)] * len(tables[0])

@@ -11,6 +11,7 @@ from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, PatternAlphabet
 from atg_fg.engines import begin_trial
+from atg_fg.learning.likelihood import BEFORE, FILED, NEW
 from atg_fg.learning.plain_evidence import SURE, UNCERTAIN, USUAL, PlainEvidence
 from atg_fg.learning.raw_trials import RawTrial
 from tests.learning.plain_paths import followed
@@ -38,9 +39,9 @@ def test_small_cases_are_the_sum_over_every_path(seed):
     evidence.catch_up(trials, ["it", "it"])
     for column, noise in enumerate([SURE, *UNCERTAIN]):
         own, fresh, summed = exactly(trials[1], trials[0], noise)
-        assert evidence.own[1, column] == pytest.approx(own, abs=1e-9)
-        assert evidence.fresh[1, column] == pytest.approx(fresh, abs=1e-9)
-        assert evidence.summed[1, column] == pytest.approx(summed, abs=1e-9)
+        assert evidence.log_evidence[FILED, 1, column] == pytest.approx(own, abs=1e-9)
+        assert evidence.log_evidence[NEW, 1, column] == pytest.approx(fresh, abs=1e-9)
+        assert evidence.log_evidence[BEFORE, 1, column] == pytest.approx(summed, abs=1e-9)
 
 
 @pytest.mark.parametrize("missing", [0.0, 0.3])
@@ -61,7 +62,7 @@ def test_the_evidence_of_all_trials_is_that_of_the_bayes_filter(missing):
                     filtering.act(trial.actions[time - 1])
                 filtering.observe(Evidence.of_detection(ARCUBES.alphabet, look))
             # Objects that share next to nothing with a trial are left out of the sum.
-            assert evidence.summed[number, column] == pytest.approx(
+            assert evidence.log_evidence[BEFORE, number, column] == pytest.approx(
                 filtering.log_evidence, abs=0.2 if missing else 0.02
             )
         patterns = [Evidence.of_detection(ARCUBES.alphabet, look).pattern for look in trial.detections]
@@ -81,8 +82,6 @@ def test_where_actions_are_uncertain_that_is_what_the_trials_say():
     uncertain, gain = table[:9].sum(axis=0), table[9:].sum(axis=0) @ (1, -1)
     assert uncertain[1] > uncertain[0] + 50
     assert gain > 5
-    # As one of either kind a trial is as probable as one of an object never met.
-    assert np.logaddexp(*table.T) == pytest.approx(np.logaddexp(*evidence.fresh[:, [0, 13]].T))
     assert evidence.best_noise(np.repeat([1.0, 0.0], 9)).concentration >= 0.3
 
 
@@ -92,14 +91,16 @@ def test_noise_is_what_explains_most():
     evidence = PlainEvidence(ARCUBES)
     evidence.catch_up([uncertain_trial(unsure, 12, rng) for _ in range(8)], ["it"] * 8)
     best = evidence.best_noise(np.ones(8))
-    totals = dict(zip(itertools.chain([SURE], UNCERTAIN), evidence.summed.sum(axis=0).tolist(), strict=True))
+    totals = dict(
+        zip(itertools.chain([SURE], UNCERTAIN), evidence.log_evidence[BEFORE].sum(axis=0).tolist(), strict=True)
+    )
     assert totals[best] > max(totals[SURE] + 50, totals[UNCERTAIN[0]])
 
 
 def test_looks_at_nothing_say_nothing():
     evidence = PlainEvidence(ARCUBES)
     evidence.catch_up([RawTrial(((None, None), (None, None)), (0,))], ["it"])
-    assert evidence.fresh == pytest.approx(0.0)
+    assert evidence.log_evidence[NEW] == pytest.approx(0.0)
 
 
 def test_what_was_forgotten_has_no_say_in_what_comes_after():
@@ -109,8 +110,7 @@ def test_what_was_forgotten_has_no_say_in_what_comes_after():
     again.forget()
     for each in (again, anew):
         each.catch_up(trials, ["one", "two", "two"])
-    for table in ("fresh", "own", "summed"):
-        np.testing.assert_array_equal(getattr(again, table), getattr(anew, table))
+    np.testing.assert_array_equal(again.log_evidence, anew.log_evidence)
 
 
 def test_of_many_objects_a_trial_may_be_of_those_that_share_most_with_it():
@@ -119,14 +119,16 @@ def test_of_many_objects_a_trial_may_be_of_those_that_share_most_with_it():
     filed, unfiled = PlainEvidence(many), PlainEvidence(many)
     for evidence, owner in ((filed, "0"), (unfiled, "another")):
         evidence.catch_up([*trials, trials[0]], [*map(str, range(13)), owner])
-    assert unfiled.summed[-1, 0] == pytest.approx(filed.own[-1, 0] - math.log(30), abs=1e-3)
+    assert unfiled.log_evidence[BEFORE, -1, 0] == pytest.approx(
+        filed.log_evidence[FILED, -1, 0] - math.log(30), abs=1e-3
+    )
 
 
 @pytest.mark.parametrize("noise", UNCERTAIN[::5])
 def test_noise_is_that_of_trials_whose_objects_are_summed_out(noise):
     evidence = PlainEvidence(SMALL)
     assert evidence.best_noise(np.zeros(0)) == USUAL  # it costs nothing beforehand
-    evidence.fresh, evidence.own, evidence.summed = (np.zeros((2, 1 + len(UNCERTAIN))) for _ in range(3))
-    evidence.summed[0, 1 + UNCERTAIN.index(noise)] = 1.0
-    evidence.summed[1, 1], evidence.own[0, 1] = 9.0, 9.0  # of another trial, and of what was taken for the object
+    table = evidence.log_evidence = np.zeros((3, 2, 1 + len(UNCERTAIN)))
+    table[BEFORE, 0, 1 + UNCERTAIN.index(noise)] = 1.0
+    table[BEFORE, 1, 1], table[FILED, 0, 1] = 9.0, 9.0  # of another trial, and of what was taken for the object
     assert evidence.best_noise(np.array([1.0, 0.0])) == noise
