@@ -190,12 +190,14 @@ results-structure: $(READY)  ## Run the experiments on learned structure (about 
 	$(BIN)/atg-fg ablation --variants "default;learned" --noises ideal --actions 10 --tests 3 \
 		--worlds prism,lock,lid-box,repeated-tags \
 		--log results/ablation_worlds.jsonl --json results/ablation_other_worlds.json
-	for world in ideal lock lid-box repeated-tags mixed random-atg half-and-half; do \
+	for world in ideal lock lid-box repeated-tags random-atg; do \
 		$(BIN)/atg-fg table1 --world $$world --preset learned --tests 5 --json results/kinds_$$world.json || exit; \
 	done
-	$(BIN)/atg-fg table1 --world prism --preset learned --tests 20 --json results/kinds_prism.json
+	for world in prism mixed half-and-half; do \
+		$(BIN)/atg-fg table1 --world $$world --preset learned --tests 20 --json results/kinds_$$world.json || exit; \
+	done
 	for world in prism mixed; do \
-		$(BIN)/atg-fg table1 --world $$world --preset learned --tests 5 --slip 0.02 --wrong 0.005 \
+		$(BIN)/atg-fg table1 --world $$world --preset learned --tests 20 --slip 0.02 --wrong 0.005 \
 			--json results/kinds_$${world}_noisy.json || exit; \
 	done
 	for world in half-and-half random-atg; do \
