@@ -29,25 +29,19 @@ from atg_fg.learning.structure_repair import follows, repairs
 
 #: A structure is settled if it is this many nats better than none.
 SETTLED_GAIN: Final = 50.0
-
 #: A structure that takes this share of looks and symbols for errors is in doubt, however much it explains.
 DOUBTFUL_ERRORS: Final = 0.02
-
 #: Structures that are kept up, and how many nats they may be behind the best.
 MAX_CANDIDATES: Final = 5
 KEPT_WITHIN: Final = 10.0
-
 #: Proposals of a search that are scored on all trials.
 MAX_PROPOSALS: Final = 4
-
 #: Annealing: chains for each number of registers, and probability of a wrong label.
 N_CHAINS: Final = 3
 WRONG_LABEL: Final = 0.01
-
 #: Trials that no structure explains are merged if there are this many, and this share of all.
 LEAST_UNEXPLAINED: Final = 6
 UNEXPLAINED_SHARE: Final = 0.1
-
 #: Rates that differ by less than this factor are as good as the same.
 RATE_FACTOR: Final = 1.25
 

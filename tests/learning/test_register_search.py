@@ -5,6 +5,7 @@ import pytest
 
 from atg_fg.core.patterns import MISSING
 from atg_fg.learning.kernels import TrialArrays
+from atg_fg.learning.likelihood import NEW
 from atg_fg.learning.plain_evidence import PlainEvidence
 from atg_fg.learning.raw_trials import Recording
 from atg_fg.learning.register_search import n_scored, search_registers
@@ -21,7 +22,7 @@ def found(trials, assumptions=ARCUBES, seed=0, n_chains=3):
     plain.catch_up(trials, [str(number) for number in range(len(trials))])
     sizes = len(assumptions.alphabet.slots), len(assumptions.actions), n_chains
     arrays = TrialArrays(looks, recording.actions, recording.lengths)
-    return search_registers(arrays, plain.fresh[:, 0], *sizes, np.random.default_rng(seed))
+    return search_registers(arrays, plain.log_evidence[NEW, :, 0], *sizes, np.random.default_rng(seed))
 
 
 def cube_trials(n, seed, n_actions=10, **noise):
