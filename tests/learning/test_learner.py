@@ -209,7 +209,12 @@ def test_in_whatever_order_objects_are_asked_for_each_has_its_own_contents():
     np.testing.assert_array_equal(again.contents[[0, 2]], best.contents[[2, 0]])
     np.testing.assert_array_equal(again.followers[[0, 2]], best.followers[[2, 0]])
     of_plain = choose_kinds([], learner._of_plain(), trials)[0].log_evidence
-    assert learner.gain == pytest.approx(learner.log_evidence - of_plain)
+    assert learner.gain == pytest.approx(learner._sets[0].log_evidence - of_plain)
+    # Against the model in which looks err it is weighed by objects never met, however trials are filed.
+    apart = StructureLearner(RING_WORLD)
+    apart.restore(list("012345"), trials, [RING], Rates())
+    assert learner.log_evidence == pytest.approx(apart.log_evidence)
+    assert learner.gain > apart.gain + 1
     learner.settle()
     assert learner.rates.share == pytest.approx((1 + 3) / (2 + 3), abs=0.005)
     assert learner.rates.slip == pytest.approx(1 / (100 + 6 * 12), rel=0.02)
