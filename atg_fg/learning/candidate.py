@@ -76,9 +76,7 @@ class Candidate:
 
         An object is the one that the trial is filed under, or any that was not met yet, each as probable.
         """
-        n_met = np.array(
-            [max(owners[:number], default=-1) + 1 for number in range(len(owners) - len(fresh), len(owners))]
-        )
+        n_met = np.maximum.accumulate([-1, *owners[:-1]])[-len(fresh) :] + 1
         n_objects = np.maximum(self._n_objects, n_met + 1)
         of_new = np.log(n_objects - n_met) + fresh
         is_new = np.array(owners[-len(fresh) :]) == n_met

@@ -83,9 +83,7 @@ class CompiledRows:
             counted = (-1, 0) if before is None or action is None else (before, action)
             learned = (*counted, pattern, self._shown_pattern)
         belief = (self._aspects, self.log_identity, self.identity)
-        evidence = np.array(
-            likelihood
-        )  # one that is read-only is of another type, for which all would be compiled again
+        evidence = np.array(likelihood)  # of a read-only array, which is another type, all would be compiled again
         log_probability = kernels.step(
             self._arrays, self._constants, belief, self._action, evidence, learned, self._shown
         )
