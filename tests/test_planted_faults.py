@@ -173,8 +173,8 @@ FAULTS = [
     Fault(
         "kinds: a trial with too many errors is one of the kind",
         "learning/kinds.py",
-        "np.minimum(kind.log_evidence, most - REFUSED)",
-        "kind.log_evidence",
+        "np.minimum(evidence, most - REFUSED)",
+        "evidence",
     ),
     Fault(
         "kinds: the doubt about which kind a trial is of does not count",
@@ -197,13 +197,13 @@ FAULTS = [
     Fault(
         "plain evidence: the object that a trial is filed under is not there",
         "learning/plain_evidence.py",
-        "own = of_each[:, rivals.index(owner)] if owner in rivals else fresh",
-        "own = fresh",
+        "filed = of_each[:, rivals.index(owner)] if owner in rivals else fresh",
+        "filed = fresh",
     ),
     Fault(
         "kinds: trials of an object met again are as those of any",
         "learning/learner.py",
-        "self._plain.of_kinds(self.noise, met_again=True)",
+        "self._plain.of_kinds(self.noise, FILED)",
         "self._plain.of_kinds(self.noise)",
     ),
     Fault(
@@ -215,8 +215,8 @@ FAULTS = [
     Fault(
         "poses: an action that fails has led on as well",
         "learning/pose_kernels.py",
-        "np.concatenate((weight * (1.0 - slip), weight * slip))",
-        "np.concatenate((weight, weight * slip))",
+        "acted[3][row] *= 1.0 - slip",
+        "acted[3][row] *= 1.0",
     ),
     Fault(
         "poses: a look reveals nothing",
