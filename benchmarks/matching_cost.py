@@ -12,11 +12,7 @@ from benchmarks.measuring import Clock, alternate, median_of, ratios, spread
 from benchmarks.memories import N_MATCHING, equal_matches, matching_course
 
 PRESET: Final = "default"
-
-
 N_ACTIONS: Final = 10
-
-
 #: A trial is short here: each round takes the median of so many.
 REPEATS: Final = 5
 

@@ -21,18 +21,10 @@ from sim.worlds.stations_world import RobonautTableWorld
 
 #: A picture is taken when the cube has turned by so much, degrees; the first one as the hands take hold.
 _TURNED: Final = (30.0, 60.0)
-
-
 _OBSERVER: Final = Camera((1.50, 0.95, 0.85), (0.21, 0.12, 0.40), 44.0, (420, 400))
-
-
 #: Across the tables, as the paper's Figure 2 shows them.
 _ACROSS: Final = Camera((2.10, 0.95, 0.98), (0.16, 0.0, 0.20), 42.0, (960, 560))
-
-
 _MIDDLE: Final = 1  # the station
-
-
 _GAP: Final = 4  # pixels
 
 

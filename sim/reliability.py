@@ -28,8 +28,6 @@ from sim.worlds.stations_world import RobonautTableWorld
 
 #: Actions between two new cubes, as in a trial.
 ACTIONS_A_TRIAL: Final = 10
-
-
 _ACTIONS: Final = tuple(ACTION_SOURCES)
 
 

@@ -57,8 +57,6 @@ COMMANDS: Final = {
 
 #: The panels of those that packages beside this one offer by entry points.
 OFFERED: Final = {"report": "Your data", "bench": "Engines", "sim": "Simulation"}
-
-
 #: Commands of earlier versions, and what they are called now.
 MOVED: Final = {"compare": "engines compare", "calibrate": "engines check", "structure": "memory structure"}
 

@@ -43,21 +43,11 @@ def _table(findings: list[Finding]) -> Table:
 
 #: What a check is: it returns a line of what it found, or raises an error that says what is wrong.
 Check: TypeAlias = Callable[[], str]
-
-
 Status: TypeAlias = Literal["works", "missing", "broken"]
-
-
 GROUP: Final = "atg_fg.checks"
-
-
 #: Seconds that a check may take; the first import of a large library on a busy machine takes some.
 TIME_LIMIT: Final = 120.0
-
-
 _RUN: Final = "import sys; from atg_fg.cli.doctor import run_check; run_check(sys.argv[1])"
-
-
 #: Exit status by which a check says that a library is not installed.
 _MISSING: Final = 3
 

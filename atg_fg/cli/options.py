@@ -144,7 +144,6 @@ Urdf = Annotated[
     ),
 ]
 
-
 WorldOption = Annotated[
     list[str] | None,
     typer.Option(

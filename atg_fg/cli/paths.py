@@ -24,18 +24,14 @@ from atg_fg.core.errors import InvalidInputError
 #: Pairs of parameters that may be of one file: a memory that goes on learning, and tests beside their memory.
 IN_PLACE: Final = (frozenset({"memory", "save_memory"}), frozenset({"records", "save_memories"}))
 
-
 #: What commands call the files in a folder that they are given.
 IN_FOLDERS: Final = re.compile(
     r"(test|run|memory)-\d+\.(json|jsonl|db|npz)(\.gz)?|look-\d+\.png|"
     r"film\.gif|(frame|belief|entropy)\.png|trial\.jsonl|memory\.json"
 )
 
-
 #: The files that SQLite keeps beside a database.
 _BESIDE: Final = ("-wal", "-shm", "-journal")
-
-
 #: What is printed has the tags beside it, in a file of the same name that ends in ``.json``.
 _PRINTED: Final = (".pdf", ".3mf", ".stl")
 

@@ -33,8 +33,6 @@ NOTHING = UncertainAction((), 1.0)
 
 #: The index of an action, or what is known of it.
 AnyAction: TypeAlias = int | UncertainAction
-
-
 #: The same as a person writes it: index or name, ``None`` if nothing happened, or the probability of each.
 GivenAction: TypeAlias = AnyAction | str | Mapping[int | str | None, float] | None
 

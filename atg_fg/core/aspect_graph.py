@@ -21,8 +21,6 @@ if TYPE_CHECKING:
 
 #: Node of the networkx view that stands for all unobserved aspects.
 COLLECTION_NODE = "collection"
-
-
 #: (source aspect, action, target aspect), all by index.
 Edge: TypeAlias = tuple[int, int, int]
 

@@ -21,32 +21,18 @@ from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.slot_checks import check_confidences, check_slots
 
 FloatArray: TypeAlias = NDArray[np.float64]
-
-
 IntArray: TypeAlias = NDArray[np.int64]
-
-
 Pattern: TypeAlias = tuple[int, ...]
-
-
 Detection: TypeAlias = tuple[int | None, ...]
 #: How sure a detector says it is of each slot's symbol, on a scale of its own; ``None`` where it does not say.
 Confidences: TypeAlias = tuple[float | None, ...]
-
-
 #: Likelihood of each symbol in each slot, ``None`` for a slot without one.
 SlotLikelihoods: TypeAlias = tuple[tuple[float, ...] | None, ...]
 #: Readings of the object as a whole, such as its weight, each with the name of its sense.
 Measured: TypeAlias = tuple[tuple[str, float], ...]
-
-
 Array = TypeVar("Array", bound=NDArray[Any])
-
-
 #: What stands in an array for the symbol of a slot where nothing was detected.
 MISSING: Final = -1
-
-
 #: Least noise and concentration of a model besides zero, and least weight of evidence beside the greatest: products of
 #: a few of them are still numbers.
 LEAST_SHARE: Final = 1e-100

@@ -12,8 +12,6 @@ from html import escape
 from typing import Final, TypeAlias
 
 _LINE: Final = "1px solid rgba(127, 127, 127, 0.35)"
-
-
 _CELL: Final = "text-align: left; padding: 0.15em 0.8em 0.15em 0; white-space: nowrap"
 
 

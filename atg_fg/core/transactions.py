@@ -10,11 +10,7 @@ from typing import Any, Concatenate, ParamSpec, Protocol, Self, TypeVar
 from atg_fg.core.records import Experiment, TrialRecord, TrialSummary
 
 _Arguments = ParamSpec("_Arguments")
-
-
 _Result = TypeVar("_Result")
-
-
 _Memory = TypeVar("_Memory", bound="Persistent")
 
 

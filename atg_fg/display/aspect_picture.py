@@ -19,19 +19,11 @@ if TYPE_CHECKING:
 
 
 Images: TypeAlias = Mapping[int, NDArray[np.uint8]]
-
-
 #: Slots that are drawn as two faces of a cube; others are drawn as tiles in a row.
 CUBE_SLOTS: Final = ("front", "top")
-
-
 INCHES_PER_UNIT: Final = 0.78
-
-
 #: How far the top of a cube is sheared to the right and up, as a part of its side.
 _SHEAR: Final = 0.42
-
-
 _HIGHLIGHT: Final = "#E69F00"
 
 

@@ -23,25 +23,17 @@ if TYPE_CHECKING:
 
 _DASHED: Final = (0, (4, 2))
 
-
 _LOOKS: Final = {
     OBSERVED: Look(),
     PREDICTED: Look(ink="#4a4a4a", linestyle="dashed", strength=0.6, side="#f0f0f0"),
     UNKNOWN: Look(ink="#9a9a9a", linestyle="dotted", strength=0.45, side="#f7f7f7"),
 }
 
-
 _OBSERVED_ARROW: Final = {"linewidth": 2.6}
-
-
 _PREDICTED_ARROW: Final = {"linewidth": 1.0, "alpha": 0.5, "linestyle": _DASHED}
-
-
 #: Predicted arrows that cross the picture are paler, so that what was observed stands out.
 _LONG: Final = 3.0
 _PREDICTED_LONG_ARROW: Final = {**_PREDICTED_ARROW, "linewidth": 0.8, "alpha": 0.28}
-
-
 #: Inches above the picture for title and legend.
 _HEAD: Final = 0.85
 

@@ -25,13 +25,8 @@ if TYPE_CHECKING:
 
 #: Colours of Okabe and Ito that people with any kind of colour blindness tell apart, without the yellow.
 PALETTE: Final = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00")
-
-
 INK: Final = "#222222"
-
-
 GREY: Final = "#767676"
-
 
 # Any: the type of a setting's name is not the same in all versions of matplotlib.
 _STYLE: Final[Any] = {
@@ -68,9 +63,7 @@ _STYLE: Final[Any] = {
     "text.usetex": False,
 }
 
-
 _FILM_COLOURS: Final = 64
-
 
 #: Metadata that would differ from run to run, by file format.
 _UNDATED: Final[dict[str, dict[str, Any]]] = {

@@ -23,15 +23,9 @@ from atg_fg.worlds.base import World
 
 #: What a world offers that shows itself.
 SHOW_IN: Final = "show_in"
-
-
 #: Where the world is looked at from in the beginning, m: the robot is at the origin and looks along x.
 _EYE: Final = (1.75, 1.25, 1.0)
-
-
 _LOOK_TARGET: Final = (0.2, 0.0, 0.3)
-
-
 _NAMED: Final = 6  # objects told by name at each look
 
 

@@ -17,30 +17,16 @@ from atg_fg.core.patterns import FloatArray
 from atg_fg.learning.completion import CompletedGraph
 
 Node: TypeAlias = int | str
-
-
 #: Room that an aspect takes up, in units of the picture.
 SPACING: Final = 1.9
-
-
 _GAP: Final = 1.0
-
-
 #: A line that is less than this from the middle of an aspect touches it, and is as bad as one that is longer by this.
 _CLEAR: Final = 0.85
-
-
 _PENALTY: Final = 8.0
-
-
 #: A larger ring is no help to the eye.
 _MAX_RING: Final = 8
-
-
 #: Up to so many rings all their orders are tried.
 _MAX_ORDERED: Final = 7
-
-
 _MAX_SWEEPS: Final = 20
 
 

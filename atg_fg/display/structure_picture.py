@@ -23,18 +23,10 @@ if TYPE_CHECKING:
 
 #: Side of a panel in inches, and how many stand in a row.
 _PANEL: Final = 3.1
-
-
 _COLUMNS: Final = 3
-
-
 #: Up to so many registers all their orders on the circle are tried; more stand as they come.
 _MAX_ORDERED: Final = 8
-
-
 _VISIBLE: Final = "#FFF3D6"
-
-
 _HIDDEN: Final = "#f1f1f1"
 
 

@@ -36,7 +36,6 @@ VARIANTS: Final[dict[str, Variant]] = {
     "learned + lookahead": Variant("learned", "lookahead-2-pruned"),
 }
 
-
 #: Options of the world, by name.
 NOISES: Final[dict[str, dict[str, float]]] = {
     "ideal": {},

@@ -25,7 +25,6 @@ PLAN: Final = ComparisonPlan(
     n_trials=5000, n_actions=3, n_objects=8, n_remembered=5, n_learning_actions=12, parameters=ModelParameters(0.1, 0.3)
 )
 
-
 _N_BINS: Final = 10
 
 

@@ -29,12 +29,8 @@ from atg_fg.worlds.base import World
 from atg_fg.worlds.registry import assumptions_of, make_world_with, sense_of
 
 Summary: TypeAlias = NDArray[np.float32]
-
-
 #: What an agent is rewarded for.
 Reward: TypeAlias = Literal["success", "entropy"]
-
-
 _REWARDS: Final = ("success", "entropy")
 
 

@@ -27,8 +27,6 @@ from atg_fg.core.patterns import FloatArray, IntArray
 
 #: Most entries of ``all_different_table``; a decision tree of so many takes some 100 bytes each.
 MAX_TABLE: Final = 2_000_000
-
-
 #: Most entries of a pass over the remembered objects, (K + 1) · 2^n: 160 MB.
 MAX_PASS: Final = 20_000_000
 

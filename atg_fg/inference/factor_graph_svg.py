@@ -11,11 +11,7 @@ from html import escape
 from typing import TypeAlias
 
 _STEP, _LEFT, _OBJECT_Y, _ASPECT_Y, _ROW = 120, 70, 40, 150, 240
-
-
 _STYLE = 'font-family="sans-serif" font-size="13" text-anchor="middle"'
-
-
 Place: TypeAlias = tuple[float, float]
 
 

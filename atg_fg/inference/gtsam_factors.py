@@ -22,26 +22,12 @@ from atg_fg.core.patterns import FloatArray
 
 #: GTSAM's classes are not typed; these aliases say what is meant.
 Factor: TypeAlias = Any
-
-
 FactorGraph: TypeAlias = Any
-
-
 Ordering: TypeAlias = Any
-
-
 MAX_TIME: Final = 1_000_000
-
-
 MAX_NUMBER: Final = 1_000
-
-
 _FIRST_OBJECT_KEY: Final = (MAX_NUMBER + 3) * MAX_TIME
-
-
 _FIRST_ASPECT_KEY: Final = (MAX_NUMBER + 2) * MAX_TIME
-
-
 HYPOTHETICAL_KEY: Final = 1
 
 

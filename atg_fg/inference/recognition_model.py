@@ -42,8 +42,6 @@ from atg_fg.inference.object_tables import ObjectTables
 
 #: State index of the collection node.
 COLLECTION = 0
-
-
 _Number = TypeVar("_Number", np.float64, np.int64)
 
 

@@ -22,15 +22,9 @@ if TYPE_CHECKING:
 
 #: Nodes are the observed aspects by index, and "pose-3" for a pose that shows none of them.
 CompletedGraph: TypeAlias = "networkx.MultiDiGraph[int | str]"
-
-
 #: What is known of a node or an edge of a completed ATG.
 OBSERVED: Final = "observed"
-
-
 PREDICTED: Final = "predicted"
-
-
 UNKNOWN: Final = "unknown"
 
 

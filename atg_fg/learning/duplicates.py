@@ -38,8 +38,6 @@ from atg_fg.learning.structured_memory import StructuredMemory
 
 #: Log odds above which two ATGs are taken for one object where a structure is believed in: a probability of 99 %.
 STRUCTURED_LOG_ODDS: Final = math.log(99.0)
-
-
 #: The same for plain ATGs. Their model takes the patterns that two objects share for independent; but two cubes with
 #: the same two tags side by side share several at once, so it is too sure.
 PLAIN_LOG_ODDS: Final = math.log(1e4)

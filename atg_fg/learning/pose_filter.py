@@ -35,12 +35,8 @@ from atg_fg.learning.shared_structure import Poses
 
 #: Rows less probable than this are left out of what is predicted for planning.
 UNIMPORTANT: Final = 1e-6
-
-
 #: A row that is by no more than this above one half is not preferred to the others.
 EVEN: Final = 1e-3
-
-
 #: Columns of ``Rows.events``.
 SLIP, WRONG, REPEAT, REVEAL = range(4)
 

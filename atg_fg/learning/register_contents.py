@@ -16,8 +16,6 @@ from atg_fg.core.patterns import FloatArray, IntArray
 
 #: Keeps divisions by what can be zero in range.
 TINY: Final = 1e-12
-
-
 #: A table that a look would change by less than this stays as it is.
 SAME: Final = 1e-6
 

@@ -28,12 +28,8 @@ if TYPE_CHECKING:
 
 #: A structure with more poses than this is not believed.
 MAX_POSES: Final = 200
-
-
 #: ι, the probability beforehand that an action is no permutation.
 IRREVERSIBLE: Final = 0.1
-
-
 #: Probability beforehand of each mode beyond the first, and of an action to make the same map as in the first mode.
 FURTHER_MODE: Final = 0.2
 TIED: Final = 0.5

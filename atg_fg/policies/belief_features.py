@@ -16,8 +16,6 @@ from atg_fg.inference.interface import Inference
 
 #: Remembered objects whose probabilities are given one by one.
 TOP: Final = 5
-
-
 #: Expected gains up to this are none, in nats.
 _NO_GAIN: Final = 1e-9
 

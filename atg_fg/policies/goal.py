@@ -23,8 +23,6 @@ from atg_fg.policies.stopping import check_entropy_threshold
 
 #: Costs above this many actions are not told apart.
 HORIZON: Final = 500
-
-
 _TOLERANCE: Final = 1e-9
 
 

@@ -23,11 +23,8 @@ if TYPE_CHECKING:
 
 #: Among paths of the same probability the one with fewer actions is better; this is too little to change any other.
 _TIE_BREAK: Final = 1e-9
-
-
 #: Node that stands for whatever an action leads to that was never tried.
 _UNTRIED: Final = -1
-
 
 #: What an edge costs, by its probability: the number of attempts to expect, or how improbable a path of them is.
 COSTS: Final[dict[str, Callable[[float], float]]] = {

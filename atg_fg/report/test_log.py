@@ -36,7 +36,6 @@ _NOT_INFERRED: Final = (
     "the probability that the object was never met."
 )
 
-
 _CROPS_LEFT_OUT: Final = "There are more crops than a page takes: later trials are shown with numbers of symbols."
 
 

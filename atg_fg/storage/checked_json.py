@@ -19,8 +19,6 @@ from atg_fg.core.errors import InvalidInputError, UnknownNameError
 
 #: Levels of lists and objects in what a file may say freely, such as the truth of a look.
 MAX_DEPTH: Final = 20
-
-
 _SOUND: Final = "a JSON document, with finite numbers and each key once"
 
 

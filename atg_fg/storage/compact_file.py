@@ -25,7 +25,6 @@ from atg_fg.storage.plain_files import read_bytes_file, starts_with, write_bytes
 
 COMPACT_FORMAT: Final = "atg-fg/compact-memory"
 
-
 #: What NumPy raises on files that are no sound archives of arrays.
 _UNSOUND: Final = (
     OSError,
@@ -43,11 +42,8 @@ _UNSOUND: Final = (
     zlib.error,
 )
 
-
 #: How files of arrays are told from others.
 SUFFIX: Final = ".npz"
-
-
 # Others are unpacked without a limit.
 _PACKINGS: Final = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 

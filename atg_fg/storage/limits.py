@@ -12,24 +12,14 @@ from atg_fg.core.errors import InvalidInputError, TooLargeError
 
 #: What a compressed file may unfold to, and what a pipe may bring; or the size of the file itself, if that is more.
 MAX_UNPACKED_BYTES: Final = 64 * 2**20
-
-
 #: The size of a file that is read at once.
 MAX_FILE_BYTES: Final = 2**31
-
-
 #: Environment variable: a number of bytes in place of both limits.
 LIMIT_VARIABLE: Final = "ATG_FG_MAX_BYTES"
-
-
 _GZIP: Final = 31  # zlib's name for data with a gzip header
-
-
 #: Bytes that are made, and taken in, at once: what a member leaves over is copied, so that it must not be all the rest.
 _PART: Final = 2**20
 _FED: Final = 2**16
-
-
 #: Zeros at the end by which it is told that a member was not written: no sound one ends with as many.
 _UNWRITTEN: Final = 9
 

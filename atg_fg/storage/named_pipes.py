@@ -13,13 +13,9 @@ from atg_fg.core.errors import InvalidInputError
 
 #: Seconds in which someone must open the other end of a named pipe; who has it open may take their time.
 PIPE_WAIT: Final = 5.0
-
-
 #: Bytes that are read at once from what has no size, and seconds between two looks whether someone writes.
 PART: Final = 2**20
 _POLL: Final = 0.02
-
-
 #: Flag of opening that does not wait for the other end; Windows has no such pipes.
 _NOT_WAITING: Final = getattr(os, "O_NONBLOCK", 0)
 

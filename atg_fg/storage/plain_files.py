@@ -31,12 +31,8 @@ except ImportError:  # not on Windows: there, what a killed writer leaves behind
 
 #: How a gzipped file begins.
 GZIP: Final = b"\x1f\x8b"
-
-
 #: How a file is named while it is written.
 _TEMPORARY: Final = (".atg-fg-", ".tmp")
-
-
 #: Links that are followed in search of an open descriptor; the kernel follows no more.
 _MOST_LINKS: Final = 40
 

@@ -12,11 +12,7 @@ from atg_fg.storage.checked_json import check_format, parse_json, placed, read_o
 from atg_fg.storage.plain_files import read_text_file
 
 PRESET_FORMAT: Final = "atg-fg/preset"
-
-
 _PARAMETERS: Final = ("transition_concentration", "observation_noise", "learn_in_trial")
-
-
 #: Left out where it is as usual.
 _OPTIONAL: Final = ("learn_structure",)
 

@@ -20,11 +20,7 @@ from atg_fg.storage.checked_json import check_format, parse_json, placed, read_e
 from atg_fg.storage.memory_json import read_assumptions, read_memory
 
 SCRIPT_FORMAT: Final = "atg-fg/scripted-trial"
-
-
 _KEYS = ("format", "version", "assumptions", "parameters", "memory", "steps")
-
-
 _PARAMETERS = ("transition_concentration", "observation_noise", "learn_in_trial")
 
 

@@ -21,8 +21,6 @@ from atg_fg.core.patterns import FloatArray
 from atg_fg.inference.elimination.discrete_model import KINDS, MAX_SCOPE, DiscreteModel, ModelFactor
 
 _SHOWN: Final = 40
-
-
 #: Is told what of a text was not read.
 Note: TypeAlias = Callable[[str], None]
 

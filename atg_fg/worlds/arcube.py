@@ -10,21 +10,12 @@ from atg_fg.core.checks import whole_number
 from atg_fg.core.patterns import FloatArray
 
 FACES: Final = ("front", "back", "left", "right", "top", "bottom")
-
-
 FRONT, BACK, LEFT, RIGHT, TOP, BOTTOM = range(6)
-
-
 N_TAGS: Final = 12
-
-
 #: Tags on the faces of a cube, in the order of ``FACES``, as it stands in orientation 0.
 Cube: TypeAlias = tuple[int, int, int, int, int, int]
-
-
 #: ``orientation[place]`` is the face of the cube that is now at that place.
 Orientation: TypeAlias = tuple[int, int, int, int, int, int]
-
 
 #: After the action, each place holds the face that stood at this place before.
 ACTION_SOURCES: Final[dict[str, Orientation]] = {
@@ -56,7 +47,6 @@ def _closure() -> tuple[tuple[Orientation, ...], tuple[tuple[int, ...], ...]]:
 
 #: All 24 orientations, and ``SUCCESSORS[orientation][action]``, the orientation an action leads to.
 ORIENTATIONS, SUCCESSORS = _closure()
-
 
 #: Outward normal of each face in the order of ``FACES`` (x away from the robot, y to its left, z up), shape [6, 3].
 FACE_NORMALS: Final[FloatArray] = np.array(

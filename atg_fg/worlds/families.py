@@ -17,27 +17,13 @@ from atg_fg.worlds.base import probability_option
 from atg_fg.worlds.finite_objects import FiniteObject, Mechanism, ObjectFamily, closed_mechanism
 
 _Draw: TypeAlias = Callable[[np.random.Generator], FiniteObject]
-
-
 #: Draws in a row without a new object after which it is taken that there are no more.
 _MOST_DRAWS: Final = 1000
-
-
 _CUBE_ACTIONS: Final = tuple(ACTION_SOURCES)
-
-
 _CUBE_ALPHABET: Final = PatternAlphabet(("front", "top"), N_TAGS)
-
-
 _CUBE: Final = Mechanism.deterministic(SUCCESSORS)
-
-
 _N_SIDES: Final = 6
-
-
 _N_RING: Final = 3
-
-
 _N_WALLS: Final = 4
 
 

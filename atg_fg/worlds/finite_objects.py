@@ -15,8 +15,6 @@ from atg_fg.core.patterns import FloatArray, IntArray, Pattern, PatternAlphabet
 
 #: A pattern, an action, and the patterns that it can lead to, each with its probability.
 ShownTransition: TypeAlias = tuple[Pattern, int, frozenset[tuple[Pattern, float]]]
-
-
 _State = TypeVar("_State", bound=Hashable)
 
 

@@ -37,16 +37,13 @@ WORLDS: Final[dict[str, str]] = {
     "detector": "atg_fg.worlds:atg_fg/Detector-v0",
 }
 
-
 #: Those of them whose objects are ARcubes, given as ``cubes``. The others draw objects of their own.
 ARCUBE_WORLDS: Final = ("ideal", "rendered", "robonaut")
-
 
 #: What ``gymnasium.make`` takes for itself, and what says which world of this project it is.
 _NOT_OPTIONS: Final = frozenset(
     {"id", "max_episode_steps", "disable_env_checker", "additional_wrappers", "vectorization_mode", "family"}
 )
-
 
 #: What Gymnasium adds to an error about options: all of them, objects too.
 _OF_GYMNASIUM: Final = " was raised from the environment creator"

@@ -21,23 +21,13 @@ from atg_fg.senses import tags
 from atg_fg.worlds.arcube import FACE_NORMALS, N_TAGS, ORIENTATIONS, Cube, rotation_of
 
 CUBE_SIZE: Final = 0.28  # m
-
-
 TAG_SIZE: Final = 0.21  # m
-
-
 #: Where the cube's centre stands on the table, before the robot, m.
 CUBE_CENTRE: Final[FloatArray] = np.array([0.42, 0.0, 0.30])
-
-
 #: 5×5 tags: the first twelve differ in at least 10 bits, those of the 4×4 dictionary in 5.
 TAG_DICTIONARY: Final = "5X5_50"
-
-
 #: Which way is up on the tag of each face, shape [6, 3].
 FACE_UPS: Final[FloatArray] = np.array([[0, 0, 1]] * 4 + [[1, 0, 0], [-1, 0, 0]], dtype=np.float64)
-
-
 _TAG_PIXELS = 84  # 12 for each of the 7 cells of a 5×5 tag with its border
 
 

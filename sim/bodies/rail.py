@@ -12,22 +12,12 @@ import pybullet
 from sim.bodies.robot_model import BASE
 
 RAIL_SPEED: Final = 0.8  # m/s, the motor's limit
-
-
 RAIL_FORCE: Final = 1000.0  # N, the motor's limit
-
-
 #: What a ride is planned with, m/s and m/s²; the motor has the rest to follow, and to hold while the arms work.
 _PLANNED_SPEED: Final = 0.7
-
-
 _PLANNED_ACCELERATION: Final = 2.0
-
-
 #: The share of a position error that the motor makes good each step, and of a speed error.
 _POSITION_GAIN, _VELOCITY_GAIN = 0.1, 1.0
-
-
 _NAME: Final = "atg-fg rail"
 
 

@@ -14,20 +14,10 @@ import numpy as np
 from atg_fg.core.patterns import FloatArray
 
 Side: TypeAlias = Literal["left", "right"]
-
-
 SIDES: Final[tuple[Side, Side]] = ("left", "right")
-
-
 _SWEEP: Final = np.radians(15)  # the shoulders point a little forward
-
-
 ARM_AXIS: Final[FloatArray] = np.array([np.sin(_SWEEP), np.cos(_SWEEP), 0.0])
-
-
 ELBOW_AXIS: Final[FloatArray] = np.array([np.cos(_SWEEP), -np.sin(_SWEEP), 0.0])
-
-
 _DOWN: Final[FloatArray] = np.array([0.0, 0.0, -1.0])
 
 
@@ -71,26 +61,17 @@ _LEFT_ARM: Final = (
     ("wrist/yaw", 0.927, 0.000, 0.000, _DOWN, -0.750, 0.150, 3.5, 100.0, 1.2, 0.03),
 )
 
-
 _SHOULDER: Final[FloatArray] = np.array([-0.0255, 0.0944, 0.5443])
-
-
 #: From the wrist's yaw joint to the middle of the rubber pad on the knuckles, m.
 PAD_OFFSET: Final = 0.085
-
-
 PAD_RADIUS: Final = 0.05  # m
-
-
 WAIST: Final = Joint("r2/waist/joint0", np.zeros(3), np.array([0.0, 0.0, 1.0]), -3.14, 3.14, 1.0, 500.0, 30.0)
-
 
 NECK: Final = (
     Joint("r2/neck/joint0", np.array([-0.08, 0.0, 0.64]), np.array([0.0, -1.0, 0.0]), -0.70, 0.175, 1.5, 40.0, 1.0),
     Joint("r2/neck/joint1", np.array([-0.08, 0.0, 0.68]), np.array([0.0, 0.0, 1.0]), -1.22, 1.22, 1.5, 40.0, 1.0),
     Joint("r2/neck/joint2", np.array([-0.08, 0.0, 0.72]), np.array([0.0, -1.0, 0.0]), -0.70, 0.175, 1.5, 40.0, 4.0),
 )
-
 
 N_ARM_JOINTS: Final = len(_LEFT_ARM)
 

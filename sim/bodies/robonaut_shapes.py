@@ -15,20 +15,10 @@ from atg_fg.core.patterns import FloatArray
 from sim.bodies.robonaut_joints import ARM_AXIS, ELBOW_AXIS, NECK, PAD_OFFSET, PAD_RADIUS, Side, arm, mirrored
 
 Kind: TypeAlias = Literal["capsule", "ball", "rounded"]
-
-
 WHITE: Final = "0.93 0.93 0.92 1"
-
-
 GREY: Final = "0.36 0.37 0.40 1"
-
-
 DARK: Final = "0.16 0.17 0.19 1"
-
-
 GOLD: Final = "0.86 0.66 0.17 1"
-
-
 #: Where the camera's eye is, m.
 EYE: Final = np.array([0.053, 0.0, 0.838])
 

@@ -19,8 +19,6 @@ from sim.bodies.robot_model import BASE
 
 #: Links no more joints apart than this cannot hit each other; their shapes overlap at the joint.
 _NEIGHBOURS: Final = 3
-
-
 #: What the eye looks at: a little before the middle of the cube's place, and below.
 _GAZE: Final = CUBE_CENTRE - [0.02, 0.0, 0.02]
 #: Of every joint.

@@ -22,7 +22,6 @@ _MATERIALS: Final = {
     robonaut_shapes.GOLD: "gold",
 }
 
-
 #: How round each kind of shape is seen, lengthwise and around: 1 is a ball, towards 0 a box.
 _ROUNDNESS: Final = {"ball": (1.0, 1.0), "rounded": (0.45, 0.45), "capsule": (0.4, 1.0)}
 

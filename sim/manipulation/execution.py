@@ -20,12 +20,8 @@ from sim.manipulation.waypoints import INWARD, Waypoint
 from sim.vision.cube_pose import CubePose
 
 _MOST_SQUARINGS: Final = 2
-
-
 #: A hand that would miss its place on a face by more cannot hold the cube, m.
 _FARTHEST_MISS: Final = 0.03
-
-
 _ROLLING_ITERATIONS: Final = 3
 _ROLLED_ENOUGH: Final = 2e-4  # m
 

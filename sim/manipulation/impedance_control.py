@@ -12,22 +12,12 @@ from atg_fg.core.patterns import FloatArray
 from sim.bodies.robot import RobotBody
 
 TIME_STEP: Final = 1 / 240  # s; a longer step makes such stiff springs unstable
-
-
 _STIFFNESS: Final = np.array([900.0, 900.0, 500.0, 600.0, 200.0, 120.0, 120.0])  # N·m/rad
-
-
 _DAMPING: Final = np.array([60.0, 60.0, 16.0, 20.0, 3.0, 2.0, 1.5])  # N·m·s/rad
-
-
 #: The share of a joint's speed that motions are planned with, on the mean: a curve from rest to rest peaks at 1.5.
 _SPEED_SHARE: Final = 0.55
-
-
 #: No more than this share is ever asked for; the rest is for the arms to catch up.
 _PEAK_SHARE: Final = 0.90
-
-
 _STEPS_PER_REFERENCE: Final = 4
 
 

@@ -19,31 +19,15 @@ from sim.bodies.kinematics import ArmKinematics
 
 #: Metres that a radian of orientation counts for.
 _ORIENTATION_WEIGHT: Final = 0.25
-
-
 _DAMPING: Final = 0.02
-
-
 #: How fast angles that the task leaves free go to the rest posture, a share of the way each iteration.
 _REST_GAIN: Final = 0.03
-
-
 _MAX_ITERATIONS: Final = 60
-
-
 _LARGEST_STEP: Final = 0.3  # rad, each joint and iteration
-
-
 _LARGEST_REACH: Final = 0.1  # m, each iteration
-
-
 _LIMIT_MARGIN: Final = 0.02  # rad kept from the joints' limits
-
-
 #: The cone is aimed at a little inside its edge, so that it is not left by rounding.
 _CONE_SHARE: Final = 0.9
-
-
 #: Not better by this share for so many iterations, a task is done as well as it can be.
 _PROGRESS, _PATIENCE = 0.002, 8
 _CLOSE_ENOUGH: Final = 1e-3  # m, and m of weighted orientation

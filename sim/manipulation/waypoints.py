@@ -18,28 +18,14 @@ from sim.vision.cube_pose import CubePose
 
 #: Inward normals of the faces that the left and the right hand press, in the cube's frame, shape [2, 3].
 INWARD: Final[FloatArray] = np.array([[0.0, -1.0, 0.0], [0.0, 1.0, 0.0]])
-
-
 #: How hard each hand presses, N.
 GRIP_FORCE: Final = 60.0
-
-
 _WIDE, _NEAR, _TRANSIT = 0.10, 0.02, 0.085  # m from the faces
-
-
 _PRESS: Final = -0.002  # m into the faces, so that the hands do not lose touch
-
-
 _FLIP_LIFT, _TURN_LIFT, _SLIDE_LIFT = 0.09, 0.006, 0.004  # m
-
-
 _PUT_DOWN: Final = np.array([0.0, 0.0, -0.003])  # a little below the table, so that the cube is felt to stand
-
-
 #: The first half of a yaw ends nearer to the robot, where the second half's hands reach both corners.
 HALFWAY: Final = np.array([-0.05, 0.0, 0.0])
-
-
 #: How far a hand leans from the face's normal at most: a yaw takes it to the limits of the wrist.
 _FLIP_CONE, _YAW_CONE = 0.6, 1.25  # rad
 

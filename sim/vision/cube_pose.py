@@ -14,8 +14,6 @@ from sim.bodies.cube import CUBE_CENTRE, CUBE_SIZE
 
 #: How upright a tag's normal must be to be the top's, and how level to be a side's (cosines).
 _UPRIGHT: Final = 0.85
-
-
 _LEVEL: Final = 0.35
 
 
@@ -37,8 +35,6 @@ def cube_pose(markers: Sequence[DetectedTag]) -> CubePose | None:
 
 #: Off by more than this, the cube is squared.
 SQUARE_ANGLE: Final = np.radians(3.0)
-
-
 SQUARE_DISTANCE: Final = 0.012  # m
 
 

@@ -11,8 +11,6 @@ from atg_fg.core.errors import unknown_name
 from sim.vision.image_noise import Imaging
 
 _GOOD_CAMERA: Final = Imaging(light_jitter=0.2, image_noise=5.0)
-
-
 _POOR_CAMERA: Final = Imaging(light_jitter=0.6, image_noise=20.0, blur=0.7, depth_noise=2.0)
 
 

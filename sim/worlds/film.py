@@ -14,17 +14,9 @@ from sim.worlds.scene import Scene
 
 #: Beside the table, looking at a robot at the world's origin.
 OBSERVER: Final = Camera((1.50, 0.90, 0.95), (0.17, 0.02, 0.41), 42.0, (480, 360))
-
-
 _LIGHT: Final = Light((1.2, 0.9, 2.2), ambient=0.55, diffuse=0.45)
-
-
 _INSET_SHARE: Final = 0.3
-
-
 _BORDER: Final = 2  # pixels
-
-
 #: Films show the robot faster than it is.
 SPEED: Final = 4.0
 

@@ -22,8 +22,6 @@ from sim.vision.tag_detection import detect_markers, detected_symbols, draw_dete
 from sim.worlds.rerun_entities import log_camera, log_cube, log_links, log_pose, log_shapes, log_world
 
 _MOST_PIXELS: Final = 2048
-
-
 _WOOD, _FLOOR = [0.66, 0.50, 0.34, 1.0], [0.80, 0.82, 0.84, 1.0]
 
 

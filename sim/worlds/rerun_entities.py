@@ -22,11 +22,7 @@ from sim.vision.camera import Camera
 
 #: Triangles of a square whose corners go round.
 _SQUARE: Final = [[0, 1, 2], [0, 2, 3]]
-
-
 _CORNERS: Final = ((-1, -1), (1, -1), (1, 1), (-1, 1))
-
-
 _IMAGE_PLANE: Final = 0.12  # m before the camera, where its picture is shown
 
 

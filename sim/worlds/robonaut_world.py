@@ -31,19 +31,11 @@ from sim.worlds.scene_viewer import SceneViewer
 
 #: An action is right if it leaves the cube this near to where it should, degrees and m.
 RIGHT_ANGLE: Final = 20.0
-
-
 RIGHT_DISTANCE: Final = 0.06
-
-
 #: How far from its place a cube may be put at the beginning of a trial, m.
 LARGEST_OFFSET: Final = 0.03
-
-
 _NEAR: Final = 0.25  # m from the eye: beyond the visor, before the hands
 _SETTLING: Final = 0.25  # s
-
-
 _ACTIONS: Final = tuple(ACTION_SOURCES)
 
 

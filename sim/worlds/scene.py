@@ -23,24 +23,12 @@ from sim.worlds.domain_randomization import Circumstances
 
 #: From one table's middle to the next one's, m: the arms at work reach into no neighbour's place.
 STATION_SPACING: Final = 0.85
-
-
 _RAIL_SPARE: Final = 0.05  # m beyond the last stations
-
-
 _RAILS: Final = (-0.20, 0.12)  # m, under the robot's base
-
-
 _SOLVER_ITERATIONS: Final = 20
-
-
 #: Contacts are looked at every so many steps.
 _STEPS_PER_SAMPLE: Final = 8
-
-
 _GRAVITY: Final = 9.81  # m/s²
-
-
 _FLOOR_SIZE: Final = [4.0, 4.0, 0.01]  # half extents, m
 _FLOOR_HEIGHT, _OUT_OF_SIGHT = -0.51, [0.0, 0.0, 50.0]  # m
 _STEEL, _FLOOR = (0.45, 0.46, 0.48, 1.0), (0.80, 0.82, 0.84, 1.0)

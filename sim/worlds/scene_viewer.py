@@ -21,8 +21,6 @@ from sim.worlds.rerun_entities import log_camera, log_cube, log_links, log_pose,
 from sim.worlds.scene import Scene
 
 _POSES_A_SECOND: Final = 10
-
-
 _EVERY: Final = max(1, round(1 / _POSES_A_SECOND / TIME_STEP))  # steps of the simulation
 
 

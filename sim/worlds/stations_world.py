@@ -20,8 +20,6 @@ from sim.worlds.robonaut_arcube_world import RobonautARcubeWorld
 from sim.worlds.scene import STATION_SPACING, PlacedCube
 
 MOST_STATIONS: Final = 5
-
-
 _N_TURNS: Final = len(ACTION_SOURCES)
 
 

@@ -9,8 +9,6 @@ from atg_fg.core.patterns import IntArray
 
 #: New entries are sorted in when they are more than this share of the others.
 _SHARE = 0.25
-
-
 _FEW = 256
 
 

@@ -14,15 +14,9 @@ from atg_fg.core.errors import InvalidInputError, WorkerLostError
 from atg_fg.experiments.executors.steps import piece_here, tell_steps_to
 
 Piece = TypeVar("Piece")
-
-
 Result = TypeVar("Result")
-
-
 #: What is accepted as an executor.
 EXECUTORS: Final = "process, thread or dask://host:port"
-
-
 #: Seconds between two questions, while pieces run, how many steps they have done.
 _SECONDS: Final = 0.2
 

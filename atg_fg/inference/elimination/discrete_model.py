@@ -12,8 +12,6 @@ from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import FloatArray
 
 KINDS: Final = ("MARKOV", "BAYES")
-
-
 #: NumPy's greatest number of axes.
 MAX_SCOPE: Final = 64
 

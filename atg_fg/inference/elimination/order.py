@@ -11,16 +11,10 @@ from typing import Final, NamedTuple, TypeAlias
 from atg_fg.core.errors import TooLargeError
 
 _BYTES_PER_ENTRY: Final = 8
-
-
 #: Entries that all tables may have which are made in turn and not kept, or 64 times the limit: they cost time.
 IN_TURN: Final = 2**32
-
-
 #: Pairs of neighbours that are looked at to say what an order needs, after its first table above the limit: a second.
 MOST_WORK: Final = 1_000_000
-
-
 #: Fill edges (or a bound below them), logarithm of the table's size, the variable; then whether the number is exact,
 #: and the variable's version.
 _Candidate: TypeAlias = tuple[int, float, int, bool, int]

@@ -18,8 +18,6 @@ from atg_fg.inference.kernels.table_kernels import Tables, write_row
 
 #: Room that each row has for the aspects and edges that a trial finds, before rows have to be moved.
 ROOM: Final = 12
-
-
 #: Rows that there is more room for, at most.
 _MOST_MORE: Final = 1000
 

@@ -18,14 +18,10 @@ from atg_fg.storage.plain_files import cannot_read, starts_with
 
 #: No text in a memory is longer; a damaged file may say so.
 _MAX_BYTES: Final = 2**26
-
-
 #: Steps of SQLite's virtual machine that a statement may take: some, and more for each byte of the file. A row takes
 #: about ten, and some bytes; so this is what a hundred times as many rows would take.
 _STEPS: Final = 10_000_000
 _STEPS_A_BYTE: Final = 200
-
-
 #: After so many steps it is looked at how many there were.
 _PACE: Final = 10_000
 
@@ -80,10 +76,7 @@ def _refuse_what_a_file_says(_action: int, _first: Any, _second: Any, _database:
 
 #: Seconds that a writer waits for another one to end its transaction.
 WAIT: Final = 5.0
-
-
 _MAGIC: Final = b"SQLite format 3\0"
-
 
 _WRITING_FAILED: Final = (
     sqlite3.SQLITE_FULL,

@@ -16,7 +16,6 @@ from atg_fg.core.errors import InvalidInputError
 #: ``PRAGMA application_id``: "ATGf" in ASCII. It tells a memory from other SQLite files.
 APPLICATION_ID: Final = 0x41544766
 
-
 _VERSION_1: Final = (
     """CREATE TABLE assumptions (
         id INTEGER PRIMARY KEY CHECK (id = 1),
@@ -54,37 +53,31 @@ _VERSION_1: Final = (
         purpose TEXT, truth TEXT NOT NULL, PRIMARY KEY (trial, number)) WITHOUT ROWID""",
 )
 
-
 _VERSION_2: Final = (
     "ALTER TABLE assumptions ADD COLUMN exclusive INTEGER NOT NULL DEFAULT 1",
     "ALTER TABLE raw_trials ADD COLUMN confidences TEXT",
 )
-
 
 _VERSION_3: Final = (
     "CREATE TABLE sense (id INTEGER PRIMARY KEY CHECK (id = 1), document TEXT NOT NULL)",
     "CREATE TABLE sensed_trials (number INTEGER PRIMARY KEY, document TEXT NOT NULL)",
 )
 
-
 _VERSION_4: Final = (
     "ALTER TABLE trials ADD COLUMN mistakes TEXT",
     "ALTER TABLE trials ADD COLUMN mended TEXT",
 )
-
 
 _VERSION_5: Final = (
     "CREATE TABLE symbols (number INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE)",
     "ALTER TABLE assumptions ADD COLUMN open INTEGER NOT NULL DEFAULT 0",
 )
 
-
 _VERSION_6: Final = (
     "ALTER TABLE assumptions ADD COLUMN object_senses TEXT",
     "ALTER TABLE graphs ADD COLUMN measured TEXT",
     "ALTER TABLE raw_trials ADD COLUMN measured TEXT",
 )
-
 
 #: The statements of each step: the first makes the tables of version 1, the n-th leads from version n − 1 to n.
 MIGRATIONS: tuple[tuple[str, ...], ...] = (_VERSION_1, _VERSION_2, _VERSION_3, _VERSION_4, _VERSION_5, _VERSION_6)

@@ -19,8 +19,6 @@ from atg_fg.storage.database.connection import reading, writing
 
 #: The kind of experiment that a test of the paper is.
 TEST_KIND: Final = "test"
-
-
 #: Seconds that a process waits for others that write trials to the same database.
 _WAIT: Final = 60.0
 

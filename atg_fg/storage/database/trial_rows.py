@@ -18,7 +18,6 @@ from atg_fg.storage.trial_log import read_step, summary_of
 #: Rows that are read at once: no more than these are in RAM, and no writer waits for a reader.
 _PAGE: Final = 200
 
-
 #: Columns of a step, but for its number; those that hold JSON.
 _STEP: Final = (
     "observed", "pattern", "unseen", "entropy", "log_evidence", "expected_entropy", "action", "purpose", "truth",
