@@ -108,7 +108,7 @@ bench: $(READY)  ## (AGAINST=revision, ROUNDS=n) Time engines and other librarie
 	$(BIN)/python benchmarks/simulation.py
 
 # One command a file: README's results tables and figures are these.
-results: $(READY)  ## Run the experiments of README's results in the ideal world (about half an hour on 2 cores)
+results: $(READY)  ## Run the experiments of README's results in the ideal world (three minutes on 2 cores)
 	mkdir -p results docs/images
 	$(BIN)/atg-fg table1 --preset paper --tests 40 --engine bayes-filter --json results/table1_paper.json
 	$(BIN)/atg-fg table1 --preset default --tests 40 --engine bayes-filter --json results/table1_default.json
@@ -181,7 +181,7 @@ results-goal: $(READY)  ## Reach goal aspects with three cubes (about half an ho
 		--video docs/images/goal.gif --json results/goal_robonaut.json
 
 # What learning the structure that objects share adds; the ablation goes on where it was cut off.
-results-structure: $(READY)  ## Run the experiments on learned structure (about two hours on 2 cores)
+results-structure: $(READY)  ## Run the experiments on learned structure (about half an hour on 2 cores)
 	mkdir -p results docs/images
 	$(BIN)/atg-fg table1 --preset learned --tests 20 --json results/table1_learned.json
 	$(BIN)/atg-fg table1 --preset learned --tests 20 --actions 6 --json results/table1_learned_6.json
