@@ -52,6 +52,7 @@ def check_that_all_run(left_out, commands, folder):
     assert (done.returncode, done.stdout.endswith("all ran\n")) == (0, True), done.stdout[-2000:] + done.stderr[-2000:]
 
 
+@pytest.mark.slow
 def test_the_core_needs_no_extra(tmp_path):
     (tmp_path / "table.csv").write_text(TABLE)
     check_that_all_run(EXTRAS, COMMANDS, tmp_path)

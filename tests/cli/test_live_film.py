@@ -43,6 +43,7 @@ def recognised(run, tmp_path, trials, **options):
     return learned, [trial["matched"] for trial in json.loads(output)["trials"]]
 
 
+@pytest.mark.slow
 def test_a_printed_cube_is_learned_and_recognised_on_video_from_end_to_end(run, tmp_path):
     trials = {"learned": [(0, ["flip", "left"], None)], "later": [(0, ["flip"], None)]}
     learned, matched = recognised(run, tmp_path, trials, **QUICK)

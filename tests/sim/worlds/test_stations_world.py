@@ -71,6 +71,7 @@ def distance(world, bodies):
     return min((point[8] for found in points for point in found), default=0.5)
 
 
+@pytest.mark.slow
 def test_the_world_keeps_gymnasiums_contract(make):
     check_env(make(n_stations=2, render_mode="rgb_array"), skip_render_check=True)
 
