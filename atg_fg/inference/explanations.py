@@ -52,17 +52,13 @@ def best_explanations(chain: Chain, k: int = 1) -> list[Explanation]:
         ImpossibleEvidenceError: The evidence has probability zero.
     """
     whole_number(k, "k", least=1)
+    _check_ways(chain, k)
     likelihoods = _likelihoods(chain)
     log_evidence = log_sum_exp(_possible(chain).log_joint)
     #: ln p of the r-th best way to each state, shape [H, W, r], and where it came from, flat over (state, rank)
     scores = (chain.log_identity[:, None] + log_of(chain.initial) + log_of(likelihoods[0]))[:, :, None]
     origins: list[IntArray] = []
     for transition, likelihood in zip(chain.transitions, likelihoods[1:], strict=True):
-        if scores.size * transition.shape[2] > _MOST_WAYS:
-            raise TooLargeError(
-                f"k: {k}: would compare {scores.size * transition.shape[2]} ways to a look at once; "
-                f"expected fewer explanations, for at most {_MOST_WAYS} ways"
-            )
         ways = scores[:, :, :, None] + log_of(transition)[:, :, None, :]
         ways = ways.reshape(len(ways), -1, transition.shape[2])
         best = np.argsort(-ways, axis=1, kind="stable")[:, :k]
@@ -77,6 +73,18 @@ def best_explanations(chain: Chain, k: int = 1) -> list[Explanation]:
             states = _traced(origins, hypothesis, state, rank)
             found.append(Explanation(hypothesis, states, log_joint - log_evidence))
     return found
+
+
+def _check_ways(chain: Chain, k: int) -> None:
+    """Raise TooLargeError if at some look too many ways to it would be compared, before any is."""
+    n_ranks = 1
+    for transition in chain.transitions:
+        if transition.size * n_ranks > _MOST_WAYS:
+            raise TooLargeError(
+                f"k: {k}: would compare {transition.size * n_ranks} ways to a look at once; "
+                f"expected fewer explanations, for at most {_MOST_WAYS} ways"
+            )
+        n_ranks = min(k, n_ranks * transition.shape[1])
 
 
 def _traced(origins: list[IntArray], hypothesis: int, state: int, rank: int) -> tuple[int, ...]:
