@@ -209,5 +209,7 @@ def peak_bytes(n_objects: int) -> float:
 
 
 if __name__ == "__main__":
+    if len(sys.argv) != 3:
+        sys.exit("expected a revision and a word: python -m benchmarks.against c7ddf6f learned")
     for row in measure(sys.argv[1], tuple(each for each in FIGURES if sys.argv[2] in each.claim))["figures"]:
         print(row["claim"], row["times_as_quick"], "times as quick; ms:", row["milliseconds"])

@@ -78,7 +78,7 @@ def kind_table(
         kinds: K structures, scored on all trials.
         plain: ln p(trial | plain) of the two plain kinds, shape [n, 2].
         trials: All raw trials, of which too many errors are none of a kind's.
-        given: What the evidence is given.
+        given: What the evidence is given: ``NEW``, ``FILED`` or ``BEFORE``.
     """
     n_looks = np.array([len(trial.detections) for trial in trials])
     columns, most = [plain], plain.max(axis=1)

@@ -74,7 +74,7 @@ class StructureLearner:
         self._candidates: list[Candidate] = []
         self._chosen: list[KindSet] = []
         self._n_chosen_from = -1
-        #: what ``_members`` found of all objects under each of the chosen sets of kinds
+        #: p(kind | its trials) of each object, by the structures of a set, shape [K, 2 + structures]
         self._kinds_of_objects: dict[tuple[int, ...], FloatArray] = {}
 
     def learn(self, owner: str, trial: RawTrial, *, rests: bool = False) -> None:

@@ -125,7 +125,7 @@ class PlainEvidence:
 
         Args:
             noise: Of objects whose actions are uncertain.
-            given: What the evidence is given.
+            given: What the evidence is given: ``NEW``, ``FILED`` or ``BEFORE``.
         """
         table: FloatArray = self.log_evidence[given][:, [0, 1 + UNCERTAIN.index(noise)]]
         return table
