@@ -15,6 +15,7 @@ from atg_fg.core.patterns import FloatArray
 from atg_fg.learning.candidate import Candidate
 from atg_fg.learning.likelihood import BEFORE
 from atg_fg.learning.pose_filter import SLIP, WRONG
+from atg_fg.learning.rates import Rates
 from atg_fg.learning.raw_trials import RawTrial
 
 #: Columns of what is no structure: plain, and plain with uncertain actions.
@@ -24,9 +25,11 @@ PLAIN_BEFORE: Final = (1.0, 0.05)
 #: Structures that one memory may have kinds of.
 MAX_KINDS: Final = 5
 #: A trial that takes more wrong looks than this for one of a kind, or slips and wrong looks, is none of it: a, b of
-#: a + b · looks. What is nearly right would else hide a kind that is not known yet.
+#: a + b · looks, and so many times as many more as the rates in force foretell. What is nearly right would else hide a
+#: kind that is not known yet.
 WRONG_LIMIT: Final = (1.5, 0.03)
 EVENT_LIMIT: Final = (1.5, 0.1)
+FORETOLD_FACTOR: Final = 2.0
 #: Nats by which such a trial is less probable than as one of a plain ATG, at least.
 REFUSED: Final = 10.0
 #: A kind that takes more of its members' looks for errors than a + b · looks is nearly right at best. It is none,
@@ -70,7 +73,7 @@ class KindSet(NamedTuple):
 
 
 def kind_table(
-    kinds: Sequence[Candidate], plain: FloatArray, trials: Sequence[RawTrial], given: int = BEFORE
+    kinds: Sequence[Candidate], plain: FloatArray, trials: Sequence[RawTrial], rates: Rates, given: int = BEFORE
 ) -> FloatArray:
     """Return ln p(trial | kind), the two plain kinds first, shape [n, 2 + K].
 
@@ -78,15 +81,18 @@ def kind_table(
         kinds: K structures, scored on all trials.
         plain: ln p(trial | plain) of the two plain kinds, shape [n, 2].
         trials: All raw trials, of which too many errors are none of a kind's.
+        rates: Those in force.
         given: What the evidence is given: ``NEW``, ``FILED`` or ``BEFORE``.
     """
     n_looks = np.array([len(trial.detections) for trial in trials])
+    foretold_wrong = rates.wrong * n_looks
+    foretold_events = foretold_wrong + rates.slip * (n_looks - 1)
+    most_wrong = WRONG_LIMIT[0] + WRONG_LIMIT[1] * n_looks + FORETOLD_FACTOR * foretold_wrong
+    most_events = EVENT_LIMIT[0] + EVENT_LIMIT[1] * n_looks + FORETOLD_FACTOR * foretold_events
     columns, most = [plain], plain.max(axis=1)
     for kind in kinds:
         wrong, events = kind.events[:, WRONG], kind.events[:, WRONG] + kind.events[:, SLIP]
-        errs = (wrong > WRONG_LIMIT[0] + WRONG_LIMIT[1] * n_looks) | (
-            events > EVENT_LIMIT[0] + EVENT_LIMIT[1] * n_looks
-        )
+        errs = (wrong > most_wrong) | (events > most_events)
         evidence = kind.log_evidence[given]
         columns.append(np.where(errs, np.minimum(evidence, most - REFUSED), evidence))
     return np.column_stack(columns)
@@ -100,7 +106,9 @@ def share_kinds(table: FloatArray) -> KindShares:
     return KindShares(*kind_kernels.share_out(np.ascontiguousarray(table), before, _ROUNDS))
 
 
-def choose_kinds(pool: Sequence[Candidate], plain: FloatArray, trials: Sequence[RawTrial]) -> list[KindSet]:
+def choose_kinds(
+    pool: Sequence[Candidate], plain: FloatArray, trials: Sequence[RawTrial], rates: Rates
+) -> list[KindSet]:
     """Return the sets of kinds that are believed in, best first: the best, and its best neighbours if not far behind.
 
     From none, the change that gains most is made for as long as there is one: one structure more, one less, one for
@@ -110,8 +118,9 @@ def choose_kinds(pool: Sequence[Candidate], plain: FloatArray, trials: Sequence[
         pool: Structures, scored on all trials.
         plain: ln p(trial | plain) of the two plain kinds, shape [n, 2].
         trials: All raw trials.
+        rates: Those in force.
     """
-    table = kind_table(pool, plain, trials)
+    table = kind_table(pool, plain, trials, rates)
     n_looks = np.array([len(trial.detections) for trial in trials])
     known: dict[frozenset[int], KindSet] = {}
 

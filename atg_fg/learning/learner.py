@@ -183,7 +183,7 @@ class StructureLearner:
         if not self._sets:
             return 0.0
         chosen = [self._candidates[number] for number in self._sets[0].structures]
-        fresh = kind_table(chosen, self._plain.of_kinds(self.noise, NEW), self.trials, NEW)
+        fresh = kind_table(chosen, self._plain.of_kinds(self.noise, NEW), self.trials, self.rates, NEW)
         return share_kinds(fresh).log_evidence + sum(each.structure.log_prior for each in chosen)
 
     def believed(self, names: Sequence[str]) -> list[BelievedStructure]:
@@ -234,7 +234,7 @@ class StructureLearner:
         shares = kinds.trials.shares
         if kinds.structures not in self._kinds_of_objects:
             chosen = [self._candidates[number] for number in kinds.structures]
-            by_trial = kind_table(chosen, self._plain.of_kinds(self.noise, FILED), self.trials, FILED)
+            by_trial = kind_table(chosen, self._plain.of_kinds(self.noise, FILED), self.trials, self.rates, FILED)
             by_object = np.zeros((len(self._objects), len(shares)))
             np.add.at(by_object, self._owner_indices, by_trial)
             by_object += np.log(shares)
@@ -335,7 +335,7 @@ class StructureLearner:
         kept = list(dict.fromkeys(number for each in self._sets for number in each.structures))
         plain = self._of_plain()
         nothing = share_kinds(plain).log_evidence
-        table = kind_table(self._candidates, plain, self.trials)
+        table = kind_table(self._candidates, plain, self.trials, self.rates)
         alone = {}
         for number, each in enumerate(self._candidates):
             if number not in kept:
@@ -357,7 +357,7 @@ class StructureLearner:
         self._plain.catch_up(self.trials, self.owners)
         for each in self._candidates:
             each.catch_up(self.trials, self._owner_indices, self.rates)
-        self._chosen = choose_kinds(self._candidates, self._of_plain(), self.trials) if self.trials else []
+        self._chosen = choose_kinds(self._candidates, self._of_plain(), self.trials, self.rates) if self.trials else []
 
     def _rescore(self) -> None:
         self._plain.forget()
