@@ -15,6 +15,8 @@ from atg_fg.learning.raw_trials import RawTrial
 from atg_fg.learning.shared_structure import SharedStructure
 from tests.learning.worlds import ARCUBES, CUBE, PRISM, cubes, prisms, random_objects, trial_of
 
+RATES = Rates()
+
 
 def exactly(table):
     """Return ln ∫ Π_t Σ_k π_k L_tk dπ, by the sum over all assignments of the trials to kinds."""
@@ -54,7 +56,7 @@ def scored(structures, objects, seed=0, n_actions=10):
     trials = [trial_of(each, n_actions, rng) for each in objects]
     pool = [Candidate(structure, ARCUBES) for structure in structures]
     for each in pool:
-        each.catch_up(trials, range(len(trials)), Rates())
+        each.catch_up(trials, range(len(trials)), RATES)
     plain = PlainEvidence(ARCUBES)
     plain.catch_up(trials, list(map(str, range(len(trials)))))
     return pool, plain.of_kinds(USUAL), trials
@@ -62,44 +64,44 @@ def scored(structures, objects, seed=0, n_actions=10):
 
 def test_two_kinds_are_better_than_either_alone():
     pool, plain, trials = scored([CUBE, PRISM], [*cubes(6), *prisms(6)])
-    best = choose_kinds(pool, plain, trials)[0]
+    best = choose_kinds(pool, plain, trials, RATES)[0]
     assert best.structures == (0, 1)
     for alone in pool:
-        assert best.log_evidence > choose_kinds([alone], plain, trials)[0].log_evidence + 50
+        assert best.log_evidence > choose_kinds([alone], plain, trials, RATES)[0].log_evidence + 50
     assert best.trials.responsibilities.argmax(axis=1).tolist() == [N_PLAIN] * 6 + [N_PLAIN + 1] * 6
 
 
 def test_a_kind_that_nothing_follows_is_not_chosen():
     pool, plain, trials = scored([PRISM, CUBE], cubes(6))
-    assert choose_kinds(pool, plain, trials)[0].structures == (1,)
+    assert choose_kinds(pool, plain, trials, RATES)[0].structures == (1,)
     pool, plain, trials = scored([PRISM, CUBE], random_objects(6, np.random.default_rng(1)))
-    assert choose_kinds(pool, plain, trials)[0].structures == ()
+    assert choose_kinds(pool, plain, trials, RATES)[0].structures == ()
 
 
 def test_a_trial_that_errs_too_much_for_a_kind_is_none_of_it():
     pool, plain, trials = scored([CUBE], cubes(1))
-    assert kind_table(pool, plain, trials)[0, N_PLAIN] > plain[0].max()
+    assert kind_table(pool, plain, trials, RATES)[0, N_PLAIN] > plain[0].max()
     spoiled = list(trials[0].detections)
     for look in (2, 4, 6, 8):  # the slots of a look exchanged: what a planted fault in the camera would show
         spoiled[look] = spoiled[look][::-1]
     wrong = [RawTrial(tuple(spoiled), trials[0].actions)]
     pool[0].forget()
-    pool[0].catch_up(wrong, [0], Rates())
-    assert kind_table(pool, plain, wrong)[0, N_PLAIN] <= plain[0].max() - 10
+    pool[0].catch_up(wrong, [0], RATES)
+    assert kind_table(pool, plain, wrong, RATES)[0, N_PLAIN] <= plain[0].max() - 10
 
 
 def test_a_structure_that_errs_a_little_in_each_trial_is_no_kind():
     pool, plain, trials = scored([CUBE], cubes(8))
-    assert choose_kinds(pool, plain, trials)[0].structures == (0,)
+    assert choose_kinds(pool, plain, trials, RATES)[0].structures == (0,)
     pool[0].events[:, WRONG] = 1.0  # few enough for each trial, and too many for all
-    assert choose_kinds(pool, plain, trials)[0].structures == ()
+    assert choose_kinds(pool, plain, trials, RATES)[0].structures == ()
 
 
 def test_sets_that_explain_nearly_as_much_are_believed_in_too():
     pool, plain, trials = scored([CUBE], cubes(2), n_actions=3)
-    gain = choose_kinds(pool, plain, trials)[0].log_evidence - share_kinds(plain).log_evidence
+    gain = choose_kinds(pool, plain, trials, RATES)[0].log_evidence - share_kinds(plain).log_evidence
     pool[0].log_evidence[:, 0] -= max(gain - 2.0, 0.0) if gain > 0 else 0.0
-    sets = choose_kinds(pool, plain, trials)
+    sets = choose_kinds(pool, plain, trials, RATES)
     assert {each.structures for each in sets} == {(0,), ()}
     assert sets[0].log_evidence >= sets[1].log_evidence > sets[0].log_evidence - 7
 
@@ -126,7 +128,7 @@ def test_the_best_set_of_kinds_is_the_best_of_all_sets(seed):
     plain = np.column_stack((rng.normal(-30, 3, n), np.full(n, -40.0)))
     explained, wrong = rng.random((6, n)) < 0.45, np.where(rng.random((6, n)) < 0.15, 1.0, 0.0)
     pool, trials = pool_of(np.where(explained, rng.normal(-20, 4, (6, n)), -70.0), structures, wrong)
-    table, evidence = kind_table(pool, plain, trials), {}
+    table, evidence = kind_table(pool, plain, trials, RATES), {}
     for chosen in itertools.chain.from_iterable(
         itertools.combinations(range(6), size) for size in range(MAX_KINDS + 1)
     ):
@@ -137,7 +139,7 @@ def test_the_best_set_of_kinds_is_the_best_of_all_sets(seed):
             for number, each in zip(chosen, of, strict=True)
         ):
             evidence[chosen] = shares.log_evidence + sum(structures[number].log_prior for number in chosen)
-    best = choose_kinds(pool, plain, trials)[0]
+    best = choose_kinds(pool, plain, trials, RATES)[0]
     assert best.log_evidence == pytest.approx(evidence[best.structures])
     assert best.structures == max(evidence, key=evidence.__getitem__)
 
@@ -146,19 +148,32 @@ def test_of_structures_that_explain_nearly_as_much_the_best_are_believed_in():
     """Each takes the place of the best one; beside it none gains what it costs beforehand."""
     behind = (3.0, 0.0, 2.0, 1.0, 4.0)
     pool, trials = pool_of([[-20.0 - each, *[-20.0] * 5] for each in behind], wide(6) * 5)
-    sets = choose_kinds(pool, np.full((6, 2), -60.0), trials)
+    sets = choose_kinds(pool, np.full((6, 2), -60.0), trials, RATES)
     assert [each.structures for each in sets] == [(1,), (3,), (2,)]
     assert [sets[0].log_evidence - each.log_evidence for each in sets] == pytest.approx([0.0, 1.0, 2.0])
 
 
 @pytest.mark.parametrize(
-    ("wrong", "slips", "is_one"), [(1.8, 0.7, True), (1.9, 0, False), (0, 2.5, True), (1, 1.7, False)]
+    ("rates", "wrong", "slips", "is_one"),
+    [
+        (RATES, 1.8, 0.7, True),
+        (RATES, 1.9, 0, False),
+        (RATES, 0, 2.8, True),
+        (RATES, 1, 1.9, False),
+        (Rates(slip=0.05, wrong=0.01), 2.0, 1.8, True),
+        (Rates(slip=0.05, wrong=0.01), 2.1, 0, False),
+        (Rates(slip=0.05, wrong=0.01), 0, 3.8, True),
+        (Rates(slip=0.05, wrong=0.01), 1, 2.9, False),
+    ],
 )
-def test_wrong_looks_and_slips_beyond_a_limit_are_none_of_a_kind(wrong, slips, is_one):
-    """Of eleven looks 1.83 wrong ones, and 2.6 of either."""
+def test_wrong_looks_and_slips_beyond_a_limit_are_none_of_a_kind(rates, wrong, slips, is_one):
+    """Of eleven looks 1.83 wrong ones and 2.6 of either, and twice as many more as the rates foretell.
+
+    These are 0.055 and 0.255 at the rates beforehand, and 0.22 and 1.22 where one action in twenty slips.
+    """
     ((kind,), trials), plain = pool_of([[-20.0]], wide(3)), np.array([[-25.0, -30.0]])
     kind.events[0, [WRONG, SLIP]] = wrong, slips
-    assert kind_table([kind], plain, trials)[0, N_PLAIN] == (-20.0 if is_one else -35.0)
+    assert kind_table([kind], plain, trials, rates)[0, N_PLAIN] == (-20.0 if is_one else -35.0)
 
 
 def test_what_few_trials_of_many_take_for_wrong_is_not_excused_by_the_others():
@@ -167,4 +182,4 @@ def test_what_few_trials_of_many_take_for_wrong_is_not_excused_by_the_others():
     plain = np.full((60, 2), -60.0)
     for wrong, chosen in ((0.7, (0, 1)), (0.75, (0,))):
         pool, trials = pool_of([first, -110.0 - first], wide(3, 4), [0.0, wrong])
-        assert choose_kinds(pool, plain, trials)[0].structures == chosen
+        assert choose_kinds(pool, plain, trials, RATES)[0].structures == chosen
