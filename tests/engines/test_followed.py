@@ -1,14 +1,22 @@
 """What follows kinds of objects in a trial, beside engines that know that kind alone."""
 
+import itertools
+
 import numpy as np
 import pytest
 
 from atg_fg.core.errors import ImpossibleEvidenceError
 from atg_fg.core.log_math import log_of
+from atg_fg.core.memory import RobotMemory
+from atg_fg.core.parameters import ModelParameters
+from atg_fg.core.patterns import Evidence
 from atg_fg.engines import begin_trial
-from atg_fg.engines.followed import FollowedPlain
+from atg_fg.engines.followed import FollowedPlain, FollowedStructure
 from atg_fg.inference.history import History
 from atg_fg.inference.recognition_model import RecognitionModel
+from atg_fg.learning.believed_structure import BelievedStructure
+from atg_fg.learning.rates import Rates
+from tests.learning.worlds import RING, RING_WORLD, objects_of
 from tests.models import random_case
 
 
@@ -36,3 +44,45 @@ def test_plain_atgs_with_uncertain_actions_learn_within_the_trial_as_in_the_baye
             np.testing.assert_allclose(
                 followed.smoothed_aspects(hypothesis)[-1], engine.smoothed_aspects(hypothesis)[-1], atol=1e-9
             )
+
+
+LOOKS = [
+    ((0, 1), (1, 2), (0, 2)),
+    ((0, 1), (0, 1), (None, 2)),
+    ((0, 1), (2, 0), (None, None)),
+    ((0, 1), (3, 4), (1, 0)),
+]
+
+
+@pytest.mark.parametrize("looks", LOOKS)
+def test_smoothed_patterns_of_a_structure_are_sums_over_all_that_may_have_happened(looks):
+    """An action turns the ring or slips, and a look is of what the pose shows or of a pattern drawn uniformly."""
+    rates, alphabet, actions = Rates(slip=0.2, wrong=0.15, repeat=1e-12), RING_WORLD.alphabet, (0, 1)
+    memory, contents = RobotMemory(RING_WORLD), np.eye(5)[[[0, 1, 2]]]
+    believed = BelievedStructure(RING, 1.0, np.ones(1), contents, 0.5)
+    followed = FollowedStructure(believed, np.log([0.5, 0.5]), rates, memory)
+    engine = begin_trial("bayes-filter", memory, ModelParameters())
+    for action, look in zip((None, *actions), looks, strict=True):
+        if action is not None:
+            engine.act(action)
+            followed.filter.act(action)
+        evidence = Evidence.of_detection(alphabet, look)
+        engine.observe(evidence)
+        followed.observe(evidence)
+
+    poses, n = RING.poses(), len(alphabet)
+    (ring,) = objects_of(RING, [[0, 1, 2]])
+    shown = [alphabet.symbols.tolist().index(list(pattern)) for pattern in ring.patterns]
+    likelihoods = [Evidence.of_detection(alphabet, look).likelihood for look in looks]
+    expected = np.zeros((3, n))
+    for path in itertools.product(range(len(shown)), repeat=3):
+        weight = 1.0
+        for time, likelihood in enumerate(likelihoods):
+            right, wrong = 0.85 * likelihood[shown[path[time]]], 0.15 * sum(likelihood[drawn] / n for drawn in range(n))
+            weight *= right + wrong
+        for (before, after), action in zip(itertools.pairwise(path), actions, strict=True):
+            weight *= 0.8 * (after == poses.successors[before, action]) + 0.2 * (after == before)
+        for time, pose in enumerate(path):
+            expected[time, shown[pose]] += weight
+    expected /= expected.sum(axis=1, keepdims=True)
+    np.testing.assert_allclose(followed.smoothed_patterns(0, engine), expected, atol=1e-9)
