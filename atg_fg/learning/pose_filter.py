@@ -193,23 +193,22 @@ class PoseFilter:
 
     def predicted_patterns(self) -> tuple[IntArray, FloatArray]:
         """Return the owners that matter, shape [I], and p(next pattern | action, owner) of each, shape [A, I, |𝒵|]."""
-        rows = self.rows.take(np.flatnonzero(self.rows.weight * self._importance()[self.rows.owner] > UNIMPORTANT))
-        first, group = _runs(rows.owner)
-        weights = rows.weight / np.add.reduceat(rows.weight, first)[group]
-        # That nothing happens is one more thing that an action may do.
-        poses = np.column_stack((self._successors[rows.pose], rows.pose)).T
-        shares = np.full((len(poses), 1), 1.0 - self._rates.slip)
-        shares[-1] = self._rates.slip
-        patterns = self._patterns_of(poses, rows.table, weights * shares, first)
-        noise = self._rates.wrong / len(self._alphabet)
-        return rows.owner[first], (1.0 - self._rates.wrong) * (patterns[:-1] + patterns[-1]) + noise
+        owners, patterns = self._patterns_after(self._successors, self._rates.slip)
+        return owners, (1.0 - self._rates.wrong) * patterns + self._rates.wrong / len(self._alphabet)
 
     def shown_patterns(self) -> tuple[IntArray, FloatArray]:
         """Return the owners that matter, shape [I], and p(pattern shown now | owner) of each, shape [I, |𝒵|]."""
-        rows = self.rows.take(np.flatnonzero(self.rows.weight * self._importance()[self.rows.owner] > UNIMPORTANT))
-        first, group = _runs(rows.owner)
-        weights = rows.weight / np.add.reduceat(rows.weight, first)[group]
-        return rows.owner[first], self._patterns_of(rows.pose[None], rows.table, weights[None], first)[0]
+        owners, (patterns,) = self._patterns_after(np.arange(len(self._successors))[:, None], 0.0)
+        return owners, patterns
+
+    def _patterns_after(self, successors: IntArray, slip: float) -> tuple[IntArray, FloatArray]:
+        """Return the owners that matter, and p(pattern shown after each move of [P', A] | owner), shape [A, I, |𝒵|]."""
+        structure = (successors, self._registers_in_view, self._possible)
+        importance, symbols = self._importance() / UNIMPORTANT, self._alphabet.symbols
+        owners, patterns = self._kernels.patterns_after(
+            tuple(self.rows), self._shown, structure, symbols, importance, slip
+        )
+        return owners, patterns
 
     def poses_of(self, owner: int) -> dict[int, float]:
         """Return the probability of each pose of an owner that is not negligible."""
@@ -310,25 +309,6 @@ class PoseFilter:
         )
         self.rows = Rows(*rows)
 
-    def _patterns_of(self, poses: IntArray, tables: IntArray, weights: FloatArray, first: IntArray) -> FloatArray:
-        """Return the weighted sum of what rows show in each of B poses, for each owner, shape [B, I, |𝒵|].
-
-        Args:
-            poses: Shape [B, R].
-            tables: Of each row, shape [R].
-            weights: Shape [B, R].
-            first: The first row of each owner, shape [I].
-        """
-        n_rows, symbols = poses.shape[1], self._alphabet.symbols
-        shown = self._shown_in_view(poses, tables)
-        factors = (weights * self._possible[poses]).ravel() / distinctness(shown, symbols)
-        combined = shown[0] * factors[:, None]
-        for probabilities in shown[1:]:
-            combined = (combined[:, :, None] * probabilities[:, None, :]).reshape(len(combined), -1)
-        begins = (n_rows * np.arange(len(poses))[:, None] + first).ravel()
-        patterns: FloatArray = np.add.reduceat(combined, begins)[:, self._places]
-        return patterns.reshape(len(poses), len(first), -1)
-
     def _of_slots(self, joint: FloatArray) -> list[FloatArray]:
         """Return the marginal of each slot, shape [J, n_symbols], of a joint of all patterns, shape [J, |𝒵|]."""
         n_slots, shape = self._alphabet.symbols.shape[1], (self._alphabet.n_symbols,)
@@ -343,10 +323,3 @@ class PoseFilter:
         symbols = self._alphabet.symbols
         places: IntArray = np.ravel_multi_index(tuple(symbols.T), (self._alphabet.n_symbols,) * symbols.shape[1])
         return places
-
-
-def _runs(values: IntArray) -> tuple[IntArray, IntArray]:
-    """Return where each run of equal values begins, and for each value the number of its run; at least one value."""
-    begins = np.ones(len(values), dtype=bool)
-    np.not_equal(values[1:], values[:-1], out=begins[1:])
-    return np.flatnonzero(begins), np.cumsum(begins) - 1

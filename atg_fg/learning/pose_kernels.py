@@ -347,3 +347,46 @@ def act(rows: Rows, successors: IntArray, actions: IntArray, slip: float) -> Row
         acted[3][n_rows + row] *= slip
         acted[5][n_rows + row, 0] += 1.0
     return acted
+
+
+@compiled
+def patterns_after(
+    rows: Rows,
+    shown: FloatArray,
+    structure: tuple[IntArray, IntArray, FloatArray],
+    symbols: IntArray,
+    importance: FloatArray,
+    slip: float,
+) -> tuple[IntArray, FloatArray]:
+    """Return the owners that matter, shape [I], and p(pattern shown after an action | owner), shape [A, I, |𝒵|].
+
+    Args:
+        rows: What is believed.
+        shown: The probability of each symbol in each register of each table, shape [K, P, S].
+        structure: Successors of each pose [P', A], the register in each slot of each pose [P', J], and 1 where these
+            are different, else 0, of each pose [P'].
+        symbols: Of every pattern, shape [|𝒵|, J].
+        importance: Of each owner, shape [H]; rows count if it times their weight is above 1.
+        slip: The probability that an action leaves the pose as it is.
+    """
+    owner, _, pose, weight, table, _ = rows
+    successors, registers, possible = structure
+    n_actions = successors.shape[1]
+    total, counts = np.zeros(len(importance)), weight * importance[owner] > 1.0
+    for row in np.flatnonzero(counts):
+        total[owner[row]] += weight[row]
+    owners, number = np.flatnonzero(total), np.cumsum(total > 0) - 1
+    # That nothing happens is one more thing that an action may do.
+    result = np.zeros((n_actions + 1, len(owners), len(symbols)))
+    for row in np.flatnonzero(counts):
+        of, share = shown[table[row]], weight[row] / total[owner[row]]
+        for action in range(n_actions + 1):
+            after = successors[pose[row], action] if action < n_actions else pose[row]
+            in_view, happens = registers[after], 1.0 - slip if action < n_actions else slip
+            factor = share * happens * possible[after] / max(different(of, in_view), TINY)
+            for pattern in range(len(symbols)):
+                probability = factor
+                for slot in range(symbols.shape[1]):
+                    probability *= of[in_view[slot], symbols[pattern, slot]]
+                result[action, number[owner[row]], pattern] += probability
+    return owners, result[:n_actions] + result[n_actions]

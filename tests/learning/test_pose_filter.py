@@ -3,6 +3,8 @@
 import numpy as np
 import pytest
 
+from atg_fg.core.actions import UncertainAction
+from atg_fg.learning.pose_chain import pose_patterns
 from atg_fg.learning.pose_filter import PoseFilter
 from atg_fg.learning.rates import Rates
 from atg_fg.learning.raw_trials import side_by_side
@@ -32,3 +34,31 @@ def test_looks_at_once_are_looks_one_by_one(structure, rivals):
         np.testing.assert_array_equal(own, other)
     np.testing.assert_array_equal(at_once.log_evidence, one_by_one.log_evidence)
     np.testing.assert_allclose(at_once._shown, symbol_probabilities(at_once._contents, OFTEN.repeat), rtol=1e-12)
+
+
+@pytest.mark.parametrize("structure", [RING, BOX], ids=["ring", "box"])
+@pytest.mark.parametrize("last", [1, UncertainAction(((0, 0.5), (1, 0.2)), 0.3)], ids=["sure", "uncertain"])
+def test_predicted_patterns_are_sums_over_poses_and_slips(structure, last):
+    """Contents are known in part; the middle one of three objects is too improbable to matter."""
+    rng, n = np.random.default_rng(5), structure.n_registers
+    contents = np.eye(5)[[rng.permutation(5)[:n] for _ in range(3)]] * rng.choice([0.0, 0.6, 1.0], (3, n, 1))
+    filtered = PoseFilter(structure.poses(), contents, OFTEN, ALPHABET, np.log([0.7, 1e-12, 0.3]))
+    filtered.observe_pattern(np.array([0, 1]))
+    filtered.act(last)
+    owners, predicted = filtered.predicted_patterns()
+    now_of, shown_now = filtered.shown_patterns()
+    assert owners.tolist() == now_of.tolist() == [0, 2]
+    poses, rows = structure.poses(), filtered.rows
+    for place, owner in enumerate(owners):
+        shown = pose_patterns(poses, filtered._contents, OFTEN, ALPHABET)
+        own = np.flatnonzero((rows.owner == owner) & (rows.weight > 1e-5))
+        total = sum(rows.weight[own])
+        now = sum(rows.weight[row] / total * shown[rows.table[row], rows.pose[row]] for row in own)
+        np.testing.assert_allclose(shown_now[place], now, rtol=0, atol=1e-9)
+        for action in range(2):
+            after = sum(
+                rows.weight[row] / total * shown[rows.table[row], poses.successors[rows.pose[row], action]]
+                for row in own
+            )
+            right = 0.95 * after + 0.05 * now
+            np.testing.assert_allclose(predicted[action, place], 0.98 * right + 0.02 / len(ALPHABET), rtol=0, atol=1e-9)
