@@ -8,7 +8,7 @@ from dataclasses import asdict, dataclass, field
 from typing import Any, Final
 
 from benchmarks import against as revisions
-from benchmarks import matching_cost, table1
+from benchmarks import matching_cost, table1, worker_start
 from benchmarks.lower_bound import floor
 from benchmarks.machine import description
 from benchmarks.measuring import Clock
@@ -90,7 +90,7 @@ def run(
         "equal_matches": equal,
         "peak_memory": peak,
         "against": compared,
-        "worker_start": table1.start_of_workers(plan.table1_rounds, clock),
+        "worker_start": worker_start.measure(plan.table1_rounds, clock),
         "table1": table1.measure(plan.tests, plan.table1_trials, plan.table1_rounds, clock),
     }
     return {**document, "targets": [target.verdict(document) for target in TARGETS]}

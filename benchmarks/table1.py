@@ -22,9 +22,6 @@ class Table1Run:
     jobs: int
 
 
-#: Processes whose start is timed.
-N_WORKERS: Final = 2
-
 RUNS: Final = (Table1Run("bayes-filter", 1), Table1Run("gtsam", 2))
 
 
@@ -68,22 +65,3 @@ def measure(n_tests: int, n_trials: int, n_rounds: int, clock: Clock) -> dict[st
         for run in RUNS
     ]
     return {"tests": n_tests, "trials": n_trials, "n_rounds": n_rounds, "engines": rows}
-
-
-def start_of_workers(n_rounds: int, clock: Clock) -> dict[str, Any]:
-    """Time two processes that are begun and run one trial each, by ``bayes-filter``.
-
-    Args:
-        n_rounds: How often.
-        clock: Tells the time.
-    """
-    plans = [(TestPlan(engine="bayes-filter", n_trials=1), seed) for seed in range(N_WORKERS)]
-
-    def sample() -> Sample:
-        start = clock()
-        run_tests(plans, N_WORKERS)
-        return {"seconds": clock() - start}
-
-    sample()  # not counted: it may compile
-    seconds = alternate({"workers": sample}, n_rounds)["workers"]["seconds"]
-    return {"processes": N_WORKERS, "rounds": seconds, "seconds": spread(seconds)}

@@ -57,6 +57,7 @@ def tables(document: dict[str, Any]) -> list[Table]:
         _floor_table(document),
         _matches_table(document),
         _table1_table(document),
+        _start_table(document["worker_start"]),
         *([_against_table(document["against"])] if document.get("against") else []),
     ]
 
@@ -236,6 +237,22 @@ def _table1_table(document: dict[str, Any]) -> Table:
         "scaled up to five tests, the start of the processes too."
     )
     return Table("Table 1", ["engine", "processes", "seconds", "ratio", "scaled up by"], rows, [note])
+
+
+def _start_table(measured: dict[str, Any]) -> Table:
+    names = {
+        "serial": "a command with one job, from its start to its end",
+        "command": "the same with two",
+        "added": "what the workers add, by round",
+        "first": "the first campaign of a Python process",
+        "later": "a later one",
+    }
+    rows = [
+        [words, with_quartiles(measured["seconds"][quantity])]
+        for quantity, words in names.items()
+        if quantity in measured["seconds"]
+    ]
+    return Table("The start of two worker processes, with a trial by each", ["", "seconds"], rows, [])
 
 
 def _against_table(compared: dict[str, Any]) -> Table:

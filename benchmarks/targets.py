@@ -114,10 +114,14 @@ def table1_seconds(engine: str) -> Figure:
     return figure
 
 
-def worker_start(document: dict[str, Any]) -> float | None:
-    """Return the median seconds in which two worker processes are begun and have run a trial each."""
-    measured = document.get("worker_start")
-    return None if measured is None else float(measured["seconds"]["median"])
+def worker_start(quantity: str) -> Figure:
+    """Return the median seconds of a quantity of ``benchmarks.worker_start`` as a figure."""
+
+    def figure(document: dict[str, Any]) -> float | None:
+        measured = document.get("worker_start", {"seconds": {}})["seconds"].get(quantity)
+        return None if measured is None else float(measured["median"])
+
+    return figure
 
 
 def growth(quantity: str) -> Figure:
@@ -156,7 +160,15 @@ TARGETS: Final = (
     Target("`learned-structure`: a decision at 100 ≤ 3 ms", milliseconds(100, "learned-structure", "learned"), 3, "ms"),
     Target("Table 1, `gtsam`, two cores ≤ 45 s", table1_seconds("gtsam"), 45, "s"),
     Target("Table 1, `bayes-filter`, one core ≤ 3 s", table1_seconds("bayes-filter"), 3, "s"),
-    Target("two worker processes: begun, with a trial by each ≤ 0.5 s", worker_start, 0.5, "s"),
+    Target(
+        "two worker processes: what they add to a command, a trial by each ≤ 0.5 s", worker_start("added"), 0.5, "s"
+    ),
+    Target(
+        "two worker processes of a process's later campaigns: begun, with a trial by each ≤ 0.5 s",
+        worker_start("later"),
+        0.5,
+        "s",
+    ),
     Target(
         "`large-memory`: a decision at 100,000 objects ≤ 1.5 times one at 100, equal matches",
         growth("decision"),

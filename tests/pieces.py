@@ -2,9 +2,12 @@
 
 import os
 import signal
+import sys
 import threading
 import time
 from pathlib import Path
+
+import numpy as np
 
 from atg_fg.experiments.executors.steps import step_done
 
@@ -88,3 +91,35 @@ def threads_of_linear_algebra(_number):
 def thread_and_process(_number):
     time.sleep(0.05)
     return threading.get_ident(), os.getpid()
+
+
+def threads_of_parent(_number):
+    """Return how many threads the process has that forked this one (Linux)."""
+    return len(os.listdir(f"/proc/{os.getppid()}/task"))
+
+
+def parent(_number):
+    time.sleep(0.05)
+    return os.getppid()
+
+
+def is_loaded(module):
+    return module in sys.modules
+
+
+def environment(_number):
+    return dict(os.environ)
+
+
+def global_random_numbers(_number):
+    time.sleep(0.05)
+    return tuple(np.random.random(3))  # noqa: NPY002
+
+
+def its_server_dies_once(piece):
+    """Piece 1 kills the process that forked it, the first time."""
+    folder, number = piece
+    if begun(folder, number) == 1 and number == 1:
+        os.kill(os.getppid(), signal.SIGKILL)
+        time.sleep(60)
+    return number

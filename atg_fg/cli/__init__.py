@@ -57,6 +57,8 @@ COMMANDS: Final = {
 
 #: The panels of those that packages beside this one offer by entry points.
 OFFERED: Final = {"report": "Your data", "bench": "Engines", "sim": "Simulation"}
+#: What is called before a command is imported that runs trials in worker processes.
+BEFORE: Final = dict.fromkeys(("table1", "figure3", "ablation", "goal"), "atg_fg.cli.early_workers:begin_workers_early")
 #: Commands of earlier versions, and what they are called now.
 MOVED: Final = {"compare": "engines compare", "calibrate": "engines check", "structure": "memory structure"}
 
@@ -71,7 +73,7 @@ class _Commands(LazyGroup):
         super().__init__(**attributes)
         for panel, places in COMMANDS.items():
             for name, place in places.items():
-                self.add_command(LazyCommand(name, place, panel))
+                self.add_command(LazyCommand(name, place, panel, BEFORE.get(name)))
         for entry in entry_points(group="atg_fg.commands"):
             self.add_command(LazyCommand(entry.name, entry.value, OFFERED.get(entry.name, "More")))
 

@@ -20,14 +20,16 @@ from typer.core import TyperCommand, TyperGroup
 class LazyCommand(TyperCommand):
     """A command, or a group of them, that is known by its place until it is called."""
 
-    def __init__(self, name: str, place: str, panel: str | None = None) -> None:
+    def __init__(self, name: str, place: str, panel: str | None = None, before: str | None = None) -> None:
         """Name a command that is at ``place``, written ``module:attribute``: a function, or a ``typer.Typer``.
 
         Args:
             name: The word that calls it.
             place: Where it is.
             panel: The panel of the list of commands that it stands in.
+            before: The place of a function that is called with the command's arguments before it is imported.
         """
+        self._before = before
         super().__init__(name, rich_help_panel=panel)
         self._module, _, self._attribute = place.partition(":")
 
@@ -44,12 +46,15 @@ class LazyCommand(TyperCommand):
         """Find the help without importing the command; import it where its source does not tell."""
         self.help = _help_in_source(self._module, self._attribute) or self.load().help
 
-    def make_context(self, *arguments: Any, **options: Any) -> Any:
+    def make_context(self, info_name: str | None, args: list[str], parent: Any = None, **extra: Any) -> Any:
         """Hand over to the command itself; from now on Ctrl-C is ``KeyboardInterrupt`` to it."""
+        if self._before is not None:
+            module, _, function = self._before.partition(":")
+            getattr(import_module(module), function)(args)
         command = self.load()
         if callable(signal.getsignal(signal.SIGINT)) and threading.current_thread() is threading.main_thread():
             signal.signal(signal.SIGINT, _interrupt)
-        return command.make_context(*arguments, **options)
+        return command.make_context(info_name, args, parent, **extra)
 
 
 class LazyGroup(TyperGroup):

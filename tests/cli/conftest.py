@@ -3,6 +3,7 @@ import sys
 import pytest
 
 from atg_fg import cli
+from atg_fg.experiments.executors import fork_server
 
 
 @pytest.fixture
@@ -11,6 +12,8 @@ def run(monkeypatch, capsys):
 
     # Whether loops are compiled now or were before is no business of these tests.
     monkeypatch.setattr(cli, "tell_of_compilation", lambda tell: None)
+    # Nor is whether workers are begun a second earlier.
+    monkeypatch.setattr(fork_server, "begin_early", lambda: None)
 
     def called(*arguments):
         monkeypatch.setattr(sys, "argv", ["atg-fg", *map(str, arguments)])

@@ -56,8 +56,9 @@ def test_a_quick_run_measures_everything_and_writes_it(run, folder, page):
                 assert len(row["ratio"][quantity]["quartiles"]) == 2
             assert row.get("agreement") is None or row["agreement"]["agrees"] in (True, None)
     assert [row["engine"] for row in document["table1"]["engines"]] == ["bayes-filter", "gtsam"]
-    assert len(document["targets"]) == 20
+    assert len(document["targets"]) == 21
     assert document["floor"][0]["milliseconds"]["floor"] > 0
+    assert set(document["worker_start"]["seconds"]) == {"command", "serial", "added", "first", "later"}
     assert "One decision" in output
 
     written = page.read_text()

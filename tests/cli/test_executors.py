@@ -52,9 +52,12 @@ def nobody_left(group):
 
 
 def workers_of(process):
-    """Return the ids of the spawned workers of a process (Linux)."""
-    children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
-    return [int(child) for child in children if b"spawn_main" in Path(f"/proc/{child}/cmdline").read_bytes()]
+    """Return the ids of the workers of a process: what its children, one of which forks, have for children (Linux)."""
+    return [worker for child in children_of(process.pid) for worker in children_of(child)]
+
+
+def children_of(process):
+    return list(map(int, Path(f"/proc/{process}/task/{process}/children").read_text().split()))
 
 
 def some_trials(folder):

@@ -66,7 +66,7 @@ def run_pieces(
     Args:
         function: Of one piece. For processes and clusters it, the pieces and the results must be picklable.
         pieces: Its arguments.
-        executor: ``process`` (spawned ones), ``thread``, or the address of a dask scheduler as ``dask://host:port``.
+        executor: ``process``, ``thread``, or the address of a dask scheduler as ``dask://host:port``.
         jobs: Processes or threads; with 1 all are done here, one after the other. A cluster has as many as it has.
         on_result: Called in this thread with the number and the result of each piece as soon as it has ended.
         on_steps: Called in this thread, now and then, with the number of steps that pieces have done since the last

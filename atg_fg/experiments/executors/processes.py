@@ -1,33 +1,32 @@
-"""Spawned processes that each run one piece of work at a time, and are replaced when they die."""
+"""Processes that each run one piece of work at a time, and are replaced when they die."""
 
 from __future__ import annotations
 
 import ctypes
 import os
 import signal
+import sys
 import threading
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
 from multiprocessing import parent_process
 from multiprocessing.context import SpawnContext, SpawnProcess
-from typing import Any, Final
+from typing import TYPE_CHECKING, Any
 
 from atg_fg.core.errors import WorkerLostError
+from atg_fg.experiments.executors.starting import answered_later, start_of_process
 from atg_fg.experiments.executors.steps import tell_steps_to
 
-#: What libraries of linear algebra read when they are loaded. There is a process for each processor already, so threads
-#: of theirs would only take turns; and a sum must not depend on how many there are.
-_ONE_THREAD: Final = dict.fromkeys(
-    ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS", "VECLIB_MAXIMUM_THREADS"), "1"
-)
+if TYPE_CHECKING:
+    from atg_fg.experiments.executors.fork_server import WorkerServer
 
 
 class WorkerProcesses:
     """Pools of one process each: a pool of several is broken as a whole when one of its processes dies.
 
-    They are spawned, and so cannot inherit half of a library's state, which a fork does.
+    A server forks them (``WorkerServer``), or else they are spawned; neither inherits half of a library's state, as a
+    fork of this process would.
 
     Args:
         slots: How many there are at most; each begins when there is something for it to do.
@@ -40,6 +39,7 @@ class WorkerProcesses:
         self._idle: list[_Worker] = []
         self._busy: dict[Future[Any], _Worker] = {}
         self._all: list[_Worker] = []
+        self._server = _take_server()
 
     def submit(self, function: Callable[[Any], Any], piece: Any) -> Future[Any]:
         """Begin a piece."""
@@ -49,13 +49,22 @@ class WorkerProcesses:
                 return self._begin(worker, function, piece)
             except BrokenProcessPool:  # it died while it was idle
                 worker.pool.shutdown()
-        with _start_of_process():
-            self._all.append(_Worker())
-        return self._begin(self._all[-1], function, piece)
+        if self._server is not None:
+            try:
+                return self._begin(self._new_worker(), function, piece)
+            except (EOFError, OSError):  # the server died
+                self._server.stop()
+                self._server = None
+        return self._begin(self._new_worker(), function, piece)
+
+    def _new_worker(self) -> _Worker:
+        with start_of_process():
+            self._all.append(_Worker(self._server))
+        return self._all[-1]
 
     def _begin(self, worker: _Worker, function: Callable[[Any], Any], piece: Any) -> Future[Any]:
         # An interruption waits until the worker is in the list: all workers in the list are ended after it.
-        with _start_of_process():
+        with start_of_process() if worker.server is None else answered_later(worker.server.give_up_loading):
             future = worker.pool.submit(function, piece)
             self._busy[future] = worker
         return future
@@ -88,16 +97,31 @@ class WorkerProcesses:
             worker.terminate()
         for worker in workers:
             worker.pool.shutdown(cancel_futures=True)
+        if self._server is not None:
+            from atg_fg.experiments.executors.fork_server import give_back
+
+            give_back(self._server)
+            self._server = None
+
+
+def _take_server() -> WorkerServer | None:
+    if sys.platform != "linux":  # elsewhere there may be nothing that this import needs
+        return None
+    from atg_fg.experiments.executors.fork_server import take_server
+
+    return take_server()
 
 
 class _Worker:
     """A pool of one process, and that process."""
 
-    def __init__(self) -> None:
-        self._context = _RecordingContext()
+    def __init__(self, server: WorkerServer | None) -> None:
+        self.server = server
+        self._context = _RecordingContext(server)
         # Only its process writes to it. So it needs no lock, which a killed process might hold for ever.
         self.steps = self._context.RawValue(ctypes.c_uint64, 0)
-        self.pool = ProcessPoolExecutor(1, mp_context=self._context, initializer=_prepare, initargs=(self.steps,))
+        told = (self.steps, None if server is None else server.environment)
+        self.pool = ProcessPoolExecutor(1, mp_context=self._context, initializer=_prepare, initargs=told)
 
     def terminate(self) -> None:
         for process in self._context.processes:
@@ -108,65 +132,35 @@ class _Worker:
 class _RecordingContext(SpawnContext):
     """Keeps the processes that a pool makes with it; the pool itself does not give them out."""
 
-    def __init__(self) -> None:
+    def __init__(self, server: WorkerServer | None) -> None:
         super().__init__()
+        self._server = server
         self.processes: list[SpawnProcess] = []
 
     def Process(self, *arguments: Any, **options: Any) -> SpawnProcess:  # type: ignore[override]  # noqa: N802
         """Make a process, as the class of this name in a context does."""
-        process = SpawnProcess(*arguments, **options)
+        process = (
+            SpawnProcess(*arguments, **options) if self._server is None else self._server.process(*arguments, **options)
+        )
         self.processes.append(process)
         return process
 
 
-@contextmanager
-def _start_of_process() -> Iterator[None]:
-    """Let processes that are begun in a ``with`` block have one thread for linear algebra, and ignore Ctrl-C.
+def _prepare(steps: Any, environment: dict[str, str] | None) -> None:
+    """Prepare a worker: it counts its steps, ignores Ctrl-C, and leaves when the process that began it is gone.
 
-    Both are inherited, and so hold from the first moment; what the user has set in the environment stays. A terminal
-    sends Ctrl-C to all processes, but only this one shall answer, and not before the block has ended: a process that
-    was told only a half of what it is to do would complain.
+    Args:
+        steps: Where it counts.
+        environment: What it has, if it is not inherited.
     """
-    added = {name: value for name, value in _ONE_THREAD.items() if name not in os.environ}
-    os.environ.update(added)
-    blockable = hasattr(signal, "pthread_sigmask")  # not on Windows
-    with _answered_later():
-        before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT}) if blockable else None
-        try:
-            yield
-        finally:
-            for name in added:
-                del os.environ[name]
-            if before is not None:
-                signal.pthread_sigmask(signal.SIG_SETMASK, before)
-
-
-@contextmanager
-def _answered_later() -> Iterator[None]:
-    """Answer Ctrl-C after the block.
-
-    To block the signal is not enough: then another thread takes it, and Python answers it in this one all the same.
-    """
-    answer = signal.getsignal(signal.SIGINT)
-    if not callable(answer) or threading.current_thread() is not threading.main_thread():
-        yield  # nobody answers, or another thread does
-        return
-    met: list[int] = []
-    signal.signal(signal.SIGINT, lambda number, _: met.append(number))
-    try:
-        yield
-    finally:
-        signal.signal(signal.SIGINT, answer)
-        if met:
-            signal.raise_signal(signal.SIGINT)
-
-
-def _prepare(steps: Any) -> None:
-    """Prepare a worker: it counts its steps, ignores Ctrl-C, and leaves when the process that began it is gone."""
 
     def tell() -> None:
         steps.value += 1
 
+    if environment is not None:
+        from atg_fg.experiments.executors.fork_server import differ_from_other_forks
+
+        differ_from_other_forks(environment)
     tell_steps_to(tell)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_leave_with_parent, daemon=True).start()

@@ -1,4 +1,4 @@
-"""Ctrl-C that meets a worker which is just being spawned: answered when it has all that it needs, and not before."""
+"""Ctrl-C that meets a process which is just being begun: answered when it has all that it needs, and not before."""
 
 import multiprocessing.util
 import os
@@ -9,6 +9,7 @@ from contextlib import closing
 
 import pytest
 
+from atg_fg.experiments.executors import fork_server
 from atg_fg.experiments.executors.processes import WorkerProcesses
 from tests import pieces
 from tests.dask_cluster import wait_for
@@ -16,9 +17,17 @@ from tests.dask_cluster import wait_for
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 
 
-@pytest.fixture
-def interrupted_spawning(monkeypatch):
-    """Let Ctrl-C come when a process has been spawned and told nothing yet, to whichever thread takes it."""
+@pytest.fixture(params=["server", "spawned"])
+def interrupted_spawning(request, monkeypatch):
+    """Let Ctrl-C come when a process has been begun and told nothing yet, to whichever thread takes it.
+
+    That is the server that forks workers, or a worker where there can be no server.
+    """
+    if request.param == "spawned":
+        monkeypatch.setattr(fork_server, "is_possible", lambda: False)
+    elif not fork_server.is_possible():
+        pytest.skip("no server is possible")
+    mark = {"server": b"forkserver", "spawned": b"spawn_main"}[request.param]
     asleep = threading.Event()
     thread = threading.Thread(target=asleep.wait)
     thread.start()
@@ -29,7 +38,7 @@ def interrupted_spawning(monkeypatch):
 
     def spawn_interrupted(path, arguments, descriptors):
         process = spawn(path, arguments, descriptors)
-        if any(b"spawn_main" in os.fsencode(each) for each in arguments):
+        if any(mark in os.fsencode(each) for each in arguments):
             begun.append(process)
             # One alone: another could come after the test. It is blocked in this thread, so another one takes it.
             if len(begun) == 1:
@@ -56,7 +65,7 @@ def has_ended(process):
 def test_an_interruption_waits_until_a_worker_has_been_told_what_to_do(interrupted_spawning, capfd):
     handler = signal.signal(signal.SIGINT, signal.default_int_handler)
     try:
-        with closing(WorkerProcesses(2)) as workers, pytest.raises(KeyboardInterrupt):
+        with pytest.raises(KeyboardInterrupt), closing(WorkerProcesses(2)) as workers:
             workers.submit(pieces.square, 3)
         assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
     finally:
