@@ -58,8 +58,7 @@ def reliability(
         parameters["pictures"] = True
     if urdf is not None:
         parameters["urdf"] = str(urdf)
-    options.write_json({"command": "sim reliability", "parameters": parameters, **summary}, json_file)
-    if json_file != "-":
+    if options.write_json({"command": "sim reliability", "parameters": parameters, **summary}, json_file):
         options.console().print(_reliability_table(f"{condition}: {actions} random actions, seed {seed}", summary))
 
 
@@ -85,8 +84,7 @@ def calibrate(
     command = f"atg-fg sim calibrate {' '.join(map(str, files))}"
     document = write_preset(parameters, missing_rate=missing_rate, measured=asdict(counts), command=command)
     options.write_json(document, str(output))
-    options.write_json({"command": "sim calibrate", "output": str(output), "preset": document}, json_file)
-    if json_file != "-":
+    if options.write_json({"command": "sim calibrate", "output": str(output), "preset": document}, json_file):
         for name, value in {**document["parameters"], "missing_rate": missing_rate}.items():
             say(f"{name}: {value}")
         say(f"saved: {output}")

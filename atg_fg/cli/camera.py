@@ -65,8 +65,7 @@ def calibrate(
     found = measure(_frames(video) if video is not None else _images(pictures or []), board)
     document = write_calibration(found)
     options.write_json(document, str(output))
-    options.write_json({"command": "camera calibrate", "output": str(output), "calibration": document}, json_file)
-    if json_file != "-":
+    if options.write_json({"command": "camera calibrate", "output": str(output), "calibration": document}, json_file):
         say(
             f"{found.n_pictures} pictures show the board; its corners lie {found.error:.2f} pixels off, "
             f"the field of view is {found.field_of_view:.1f} degrees"

@@ -16,7 +16,7 @@ from atg_fg.cli.terminal import say
 from atg_fg.core.assumptions import arcube_assumptions
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
-from atg_fg.core.records import TrialRecord, TrialStep
+from atg_fg.core.records import TrialRecord
 from atg_fg.display import figures, trial_plots
 from atg_fg.display.frames import FrameFolder, has_camera
 from atg_fg.display.rerun_viewer import TrialViewer, check_path, import_rerun
@@ -125,22 +125,11 @@ def demo(
         console.print(f"The robot remembers {N_REMEMBERED} {things} that it turned over before.")
         rng = np.random.default_rng(trial_seed)
         presented = N_REMEMBERED if novel else int(rng.integers(N_REMEMBERED))
-        story = Story(console, memory)
         camera = FrameFolder(folder / "trial.jsonl", made_world) if has_camera(made_world) else None
-
-        def on_step(step: TrialStep) -> None:
-            story.tell(step)
-            if camera is not None:
-                camera.take(step)
-
+        story = Story(console, memory) if camera is None else Story(console, memory, camera.take)
+        inference, shown = begin_trial(engine, memory, parameters), {"object": presented}
         record = run_trial(
-            made_world,
-            begin_trial(engine, memory, parameters),
-            EntropyPolicy(),
-            actions,
-            rng,
-            reset_options={"object": presented},
-            on_step=on_step,
+            made_world, inference, EntropyPolicy(), actions, rng, reset_options=shown, on_step=story.tell
         )
         story.verdict(record)
         truth = None if novel else record.names[presented]
@@ -150,14 +139,8 @@ def demo(
         _save(folder, made_world, record, memory, lines)
     saved = [str(path) for path in sorted(folder.iterdir())]
     console.print(f"saved:   {', '.join(saved)}")
-    document = {
-        "command": "demo",
-        "outcome": record.verdict,
-        "judged_novel": record.judged_novel,
-        "matched": record.matched,
-        "truth": truth,
-    }
-    options.write_json({**document, "saved": saved}, json_file)
+    ending = {"outcome": record.verdict, "judged_novel": record.judged_novel, "matched": record.matched}
+    options.write_json({"command": "demo", **ending, "truth": truth, "saved": saved}, json_file)
 
 
 def _save(folder: Path, world: World, record: TrialRecord, memory: RobotMemory, lines: str) -> None:
@@ -203,27 +186,15 @@ def watch(
     parameters, engine = options.model_of(preset, engine, "bayes-filter")
     chosen_policy = make_policy(policy)
     learn_seed, trial_seed = np.random.SeedSequence(seed).spawn(2)
-    made_world, memory = world_with_memory(
-        world,
-        parameters,
-        seed,
-        np.random.default_rng(learn_seed),
-        **options.world_options(condition=condition, urdf=urdf),
-    )
+    own = options.world_options(condition=condition, urdf=urdf)
+    made_world, memory = world_with_memory(world, parameters, seed, np.random.default_rng(learn_seed), **own)
     with closing(made_world):
         viewer = TrialViewer(made_world, memory, save)
-        story = Story(options.console(), memory)
+        story = Story(options.console(), memory, viewer.tell)
         rng = np.random.default_rng(trial_seed)
         presented = N_REMEMBERED if novel else int(rng.integers(N_REMEMBERED))
-
-        def on_step(step: TrialStep) -> None:
-            story.tell(step)
-            viewer.tell(step)
-
-        inference = begin_trial(engine, memory, parameters)
-        record = run_trial(
-            made_world, inference, chosen_policy, actions, rng, reset_options={"object": presented}, on_step=on_step
-        )
+        inference, shown = begin_trial(engine, memory, parameters), {"object": presented}
+        record = run_trial(made_world, inference, chosen_policy, actions, rng, reset_options=shown, on_step=story.tell)
         story.verdict(record)
         viewer.verdict(record)
         viewer.close()

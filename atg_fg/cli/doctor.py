@@ -27,8 +27,7 @@ def doctor(json_file: options.JsonFile = None) -> None:
     Example: atg-fg doctor
     """
     findings = diagnose()
-    options.write_json({"command": "doctor", "findings": [asdict(finding) for finding in findings]}, json_file)
-    if json_file != "-":
+    if options.write_json({"command": "doctor", "findings": [asdict(finding) for finding in findings]}, json_file):
         options.console().print(_table(findings))
     if any(finding.required and finding.status != "works" for finding in findings):
         raise typer.Exit(1)

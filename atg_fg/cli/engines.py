@@ -122,8 +122,7 @@ def check(
         summary = calibration.summarise(calibration.run_calibration(engine, plan, seed, advance))
     parameters = {"engine": engine, "trials": trials, "seed": seed}
     document = {"command": "calibrate", "parameters": parameters, **summary}
-    options.write_json(document, json_file)
-    if json_file != "-":
+    if options.write_json(document, json_file):
         test = summary["chi_square"]
         options.print_tables(tables_of(document), f"{engine}: {trials} trials drawn from the model, seed {seed}")
         say(f"reliability error: {summary['reliability_error']:.4f}")

@@ -156,8 +156,7 @@ def table1(
             }
         ),
     }
-    options.write_json({"command": "table1", "parameters": parameters, **summary}, json_file)
-    if json_file != "-":
+    if options.write_json({"command": "table1", "parameters": parameters, **summary}, json_file):
         number = f"{actions} actions" if settled is None else f"up to {actions} actions"
         title = f"Table 1: {world} world, preset {preset}, {policy} policy, {number} a trial, engine {engine}"
         options.console().print(_table1(title, results, summary, beside_paper=world in ARCUBE_WORLDS))

@@ -71,8 +71,7 @@ def explain(
         document["samples"] = [_entry(inference, explanation) for explanation in drawn]
     if smooth:
         document["smoothed"] = smoothed(inference)
-    options.write_json(document, json_file)
-    if json_file != "-":
+    if options.write_json(document, json_file):
         console = options.console()
         for kind in document.get("kinds", []):
             console.print(f"{kind['probability']:.3f}  {kind['kind']}", soft_wrap=True)

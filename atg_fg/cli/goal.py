@@ -150,8 +150,7 @@ def goal(
         **world_options,
     }
     document = {"command": "goal", "parameters": parameters, **summary}
-    options.write_json(document, json_file)
-    if json_file != "-":
+    if options.write_json(document, json_file):
         title = f"{trials} runs, {cubes} of {memory_cubes} cubes, {world} world, preset {preset}, engine {engine}"
         options.print_tables(tables_of(document), title)
 

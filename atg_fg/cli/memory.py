@@ -54,8 +54,7 @@ def duplicates(
         find = merge_duplicates if merge else find_duplicates
         pairs = find(memory, parameters, threshold=threshold)
     document = {"command": "memory duplicates", "merged": merge, "pairs": [asdict(pair) for pair in pairs]}
-    options.write_json(document, json_file)
-    if json_file != "-":
+    if options.write_json(document, json_file):
         did = "merged" if merge else "probably of one object"
         say(f"{file}: {len(pairs)} pairs of {len(memory) + len(pairs) * merge} ATGs {did}")
         for pair in pairs:
@@ -200,8 +199,7 @@ def _check(file: Path, json_file: str | None) -> int:
         sound["faults"] = faults
     else:
         sound["objects"] = 0 if memory is None else len(memory)
-    options.write_json({"command": "memory check", **sound}, json_file)
-    if json_file != "-":
+    if options.write_json({"command": "memory check", **sound}, json_file):
         for line in faults or [f"{file}: sound, {sound['objects']} ATGs"]:
             say(line)
     return 1 if faults else 0
@@ -218,8 +216,7 @@ def repair(
     Example: atg-fg memory repair robot.db
     """
     faults = repair_database(file)
-    options.write_json({"command": "memory repair", "faults": faults}, json_file)
-    if json_file != "-":
+    if options.write_json({"command": "memory repair", "faults": faults}, json_file):
         for line in faults or [f"{file}: no record in it is bad"]:
             say(line)
 

@@ -166,8 +166,7 @@ def merge(
         "renamed": union.renamed,
         "trials": n_trials,
     }
-    options.write_json(document, json_file)
-    if json_file != "-":
+    if options.write_json(document, json_file):
         say(f"{output}: {len(union.memory)} ATGs, {len(union.same)} of them in both; {n_trials} trials")
         for old, new in union.renamed.items():
             say(f"{second}: {old} is {new}")
@@ -193,8 +192,7 @@ def diff(
     Example: atg-fg memory diff before.json robot.db
     """
     found = difference(load_memory(first), load_memory(second))
-    options.write_json({"command": "memory diff", "same": not found, "difference": found}, json_file)
-    if json_file != "-":
+    if options.write_json({"command": "memory diff", "same": not found, "difference": found}, json_file):
         for line in _told(found):
             say(line)
     return 1 if found else 0
@@ -236,6 +234,5 @@ def compact(
     memory_files.save_memory(memory, output)
     made = CompactMemory.of(memory)
     document = {"command": "memory compact", "objects": len(made), "bytes": made.nbytes}
-    options.write_json(document, json_file)
-    if json_file != "-":
+    if options.write_json(document, json_file):
         say(f"{output}: {len(made)} ATGs, {made.nbytes} bytes in memory")

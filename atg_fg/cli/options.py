@@ -203,15 +203,14 @@ def check_executor_option(executor: str, jobs: int | None) -> int:
     return jobs or available_cpus()
 
 
-def write_json(document: dict[str, Any], path: str | None) -> None:
-    """Write a result to ``path``, or print it if that is ``-``."""
-    if path is None:
-        return
-    text = json.dumps(document, indent=1, allow_nan=False) + "\n"
+def write_json(document: dict[str, Any], path: str | None) -> bool:
+    """Write a result to ``path``, if given, or print it if that is ``-``; return whether it is to be told in words."""
+    text = "" if path is None else json.dumps(document, indent=1, allow_nan=False) + "\n"
     if path == "-":
         sys.stdout.write(text)
-    else:
+    elif path is not None:
         plain_files.write_bytes_atomically(path, text.encode())
+    return path != "-"
 
 
 def console(json_path: str | None = None) -> PlainConsole:

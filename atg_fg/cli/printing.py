@@ -65,8 +65,7 @@ def cube(
     options.write_json(write_tags(known), str(beside))
     needed = expected_actions(chosen)
     result = {"tags": write_tags(known), "expected_actions": needed, "output": str(output), "tags_file": str(beside)}
-    options.write_json({"command": "print cube", **result}, json_file)
-    if json_file != "-":
+    if options.write_json({"command": "print cube", **result}, json_file):
         for number, each in enumerate(chosen):
             say(f"cube {number + 1}: tags {' '.join(map(str, each))}")
         if cubes > 1:

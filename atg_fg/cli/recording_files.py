@@ -59,8 +59,7 @@ def check(
         "looks": sum(len(trial.looks) for trial in recording.trials),
         "odd": [{"kind": each.kind, "place": each.place, "what": each.what, "fatal": each.fatal} for each in faults],
     }
-    options.write_json(document, json_file)
-    if json_file != "-":
+    if options.write_json(document, json_file):
         for kind, names in names_of.items():
             if names:
                 say(f"{kind}: {', '.join(names)}")

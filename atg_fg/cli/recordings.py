@@ -96,8 +96,8 @@ def learn(
                 else:
                     recorded_trials.learn(each, kept, chosen, parameters, advance)
         document = {"command": "learn", **_learned(kept, memory, recordings)}
-        _save(kept, memory, document, json_file)
-    if json_file != "-":
+        is_told = _save(kept, memory, document, json_file)
+    if is_told:
         _tell_learned(document)
 
 
@@ -157,19 +157,23 @@ def recognise(
         }
         if write_page is not None and report is not None:
             write_page(found, kept, scored, report)
-        _save(kept, memory if learns else None, document, json_file)
-    if json_file != "-":
+        is_told = _save(kept, memory if learns else None, document, json_file)
+    if is_told:
         options.print_tables([_table_of(document)])
         _tell_score(document)
         if report is not None:
             say(f"saved: {report}")
 
 
-def _save(memory: RobotMemory, path: Path | None, document: dict[str, Any], json_file: str | None) -> None:
-    """Write what a command found, then the memory: whoever repeats one that failed does not learn all once more."""
-    options.write_json(document, json_file)
+def _save(memory: RobotMemory, path: Path | None, document: dict[str, Any], json_file: str | None) -> bool:
+    """Write what a command found, then the memory: whoever repeats one that failed does not learn all once more.
+
+    Returns as ``options.write_json`` does.
+    """
+    is_told = options.write_json(document, json_file)
     if path is not None and not memory.is_kept:
         save_memory(memory, path)
+    return is_told
 
 
 def given_spec(

@@ -40,6 +40,5 @@ def rescore(
         for file, result in results.items()
     ]
     document = {"command": "rescore", "parameters": {"preset": preset, "engine": engine}, "tests": tests}
-    options.write_json(document, json_file)
-    if json_file != "-":
+    if options.write_json(document, json_file):
         options.print_tables(tables_of(document), f"Recorded tests, judged with preset {preset}, engine {engine}")

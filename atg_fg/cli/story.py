@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from rich.console import Console
 
@@ -19,10 +19,13 @@ class Story:
     Args:
         console: Where to print.
         memory: The robot memory the trial began with.
+        also: Called with each step, too, once it is told.
     """
 
-    def __init__(self, console: Console, memory: RobotMemory) -> None:
-        self.console = console
+    def __init__(
+        self, console: Console, memory: RobotMemory, also: Callable[[TrialStep], None] = lambda _: None
+    ) -> None:
+        self.console, self._also = console, also
         self.assumptions = memory.assumptions
         self.names = memory.names
         self._time = 0
@@ -44,6 +47,7 @@ class Story:
             chosen = self.assumptions.actions[step.action]
             self.console.print(f"  → {chosen}{self._reasons(step)}")
         self._time += 1
+        self._also(step)
 
     def verdict(self, record: TrialRecord) -> None:
         """Print what the object was judged to be."""

@@ -63,8 +63,7 @@ def structure(
     document = _document(learned, believed, completed)
     if name is not None:
         document["completed"] = _graph_document(completed[name])
-    options.write_json(document, json_file)
-    if json_file != "-":
+    if options.write_json(document, json_file):
         _tell(file, document)
 
 
@@ -81,8 +80,7 @@ def _tell_none(file: Path, memory: StructuredMemory | None, plot: Path | None, j
     trials = 0 if memory is None else len(memory.learner.trials)
     erring = {} if memory is None else summary_of_evidence(memory)
     document = {"command": "structure show", "trials": trials, "structures": [], "objects": []}
-    options.write_json({**document, **({"erring": erring} if erring else {})}, json_file)
-    if json_file != "-":
+    if options.write_json({**document, **({"erring": erring} if erring else {})}, json_file):
         say(f"{file}: no learned structure: {reason}")
         _tell_erring(erring)
 

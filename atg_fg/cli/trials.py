@@ -18,7 +18,7 @@ from atg_fg.cli.story import Story
 from atg_fg.core.assumptions import arcube_assumptions
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.memory import RobotMemory
-from atg_fg.core.records import Experiment, TrialStep, TrialSummary
+from atg_fg.core.records import Experiment, TrialSummary
 from atg_fg.core.version import __version__
 from atg_fg.display.frames import FrameFolder
 from atg_fg.engines import begin_trial
@@ -92,16 +92,11 @@ def trial(
         empty = RobotMemory(assumptions_of(made_world, N_OBJECTS), sense=sense_of(made_world))
         remembered = stack.enter_context(memory_for(parameters, empty if kept is None else kept))
         inference = begin_trial(engine, remembered, parameters)
-        story = Story(options.console(json_file), remembered)
+        console = options.console(json_file)
         rng = np.random.default_rng(np.random.SeedSequence(seed))
         camera = FrameFolder(record, made_world) if frames and record is not None else None
-
-        def on_step(step: TrialStep) -> None:
-            story.tell(step)
-            if camera is not None:
-                camera.take(step)
-
-        result = run_trial(made_world, inference, chosen_policy, actions, rng, on_step=on_step)
+        story = Story(console, remembered) if camera is None else Story(console, remembered, camera.take)
+        result = run_trial(made_world, inference, chosen_policy, actions, rng, on_step=story.tell)
         story.verdict(result)
         story.mistakes(result.mistakes)
         lines = to_json_lines(result, camera.taken if camera is not None else (), **header)

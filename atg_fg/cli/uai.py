@@ -53,8 +53,7 @@ def solve(
         observed = read_evidence(plain_files.read_text_file(evidence), str(evidence), _note)
         read.check_evidence(observed, str(evidence))
     line, answer = TASKS[task](read, observed, limit)
-    options.write_json({"command": "uai solve", "model": str(model), "task": task, **answer}, json_file)
-    if json_file != "-":
+    if options.write_json({"command": "uai solve", "model": str(model), "task": task, **answer}, json_file):
         say(task, line)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from atg_fg.core.log_math import log_of
 from atg_fg.core.memory import RobotMemory
-from atg_fg.core.patterns import Evidence, FloatArray, IntArray
+from atg_fg.core.patterns import Evidence, FloatArray, IntArray, PatternAlphabet
 from atg_fg.inference.belief_components import LEAST_PROBABILITY, BeliefComponent, components_of
 from atg_fg.inference.chain import Chain, build_chain, forward_backward
 from atg_fg.inference.history import History
@@ -34,6 +34,7 @@ from atg_fg.learning.shared_structure import Poses
 from atg_fg.learning.structured_memory import StructuredMemory
 
 FilterT = TypeVar("FilterT", bound=PoseFilter | PathFilter | PlainFilter)
+PosesT = TypeVar("PosesT", bound=PoseFilter | PathFilter)
 
 
 class Followed(ABC, Generic[FilterT]):
@@ -80,7 +81,30 @@ class Followed(ABC, Generic[FilterT]):
         """
 
 
-class FollowedStructure(Followed[PoseFilter]):
+class FollowedPoses(Followed[PosesT]):
+    """Objects of a kind whose aspects are poses; arguments and attributes are those of ``Followed``."""
+
+    _poses: Poses
+    _rates: Rates
+    _alphabet: PatternAlphabet
+
+    def components(self, belief: FloatArray) -> list[BeliefComponent]:
+        """Return the component of each probable object, with its poses as aspects.
+
+        Args:
+            belief: p(O, the object is of this kind | z_0:t, a_1:t), shape [H].
+        """
+        components = []
+        for hypothesis in np.flatnonzero(belief >= LEAST_PROBABILITY).tolist():
+            contents = self.filter.learned_contents(hypothesis)
+            if contents is not None:
+                graph = pose_graph(self._poses, contents, self._rates, self._alphabet)
+                poses = self.filter.poses_of(hypothesis)
+                components.append(BeliefComponent(hypothesis, float(belief[hypothesis]), graph, poses))
+        return components
+
+
+class FollowedStructure(FollowedPoses[PoseFilter]):
     """One believed structure in a trial.
 
     Args:
@@ -99,21 +123,6 @@ class FollowedStructure(Followed[PoseFilter]):
         contents = np.concatenate((believed.contents, new))
         own = PoseFilter(self._poses, contents, rates, self._alphabet, log_weights)
         super().__init__(words_of_structure(believed.structure), log_weights, own)
-
-    def components(self, belief: FloatArray) -> list[BeliefComponent]:
-        """Return the component of each probable object, with its poses as aspects.
-
-        Args:
-            belief: p(O, the object follows this structure | z_0:t, a_1:t), shape [H].
-        """
-        components = []
-        for hypothesis in np.flatnonzero(belief >= LEAST_PROBABILITY).tolist():
-            contents = self.filter.learned_contents(hypothesis)
-            if contents is not None:
-                graph = pose_graph(self._poses, contents, self._rates, self._alphabet)
-                poses = self.filter.poses_of(hypothesis)
-                components.append(BeliefComponent(hypothesis, float(belief[hypothesis]), graph, poses))
-        return components
 
     def observe(self, evidence: Evidence) -> None:
         """Take in the evidence of a look."""
@@ -155,7 +164,7 @@ class FollowedStructure(Followed[PoseFilter]):
         return patterns
 
 
-class FollowedChain(Followed[PathFilter]):
+class FollowedChain(FollowedPoses[PathFilter]):
     """One chain of samples in a trial.
 
     Args:
@@ -185,20 +194,6 @@ class FollowedChain(Followed[PathFilter]):
     def observe(self, evidence: Evidence) -> None:
         """Take in the evidence of a look."""
         self.filter.observe(evidence)
-
-    def components(self, belief: FloatArray) -> list[BeliefComponent]:
-        """Return the component of each probable object, with its states as aspects.
-
-        Args:
-            belief: p(O, the chain | z_0:t, a_1:t), shape [H].
-        """
-        components = []
-        for hypothesis in np.flatnonzero(belief >= LEAST_PROBABILITY).tolist():
-            contents = self.filter.learned_contents(hypothesis)
-            graph = pose_graph(self._poses, contents, self._rates, self._alphabet)
-            poses = self.filter.poses_of(hypothesis)
-            components.append(BeliefComponent(hypothesis, float(belief[hypothesis]), graph, poses))
-        return components
 
     def smoothed_patterns(self, hypothesis: int, inference: Inference) -> list[FloatArray]:
         """Return p(pattern shown at time s | O = hypothesis, all evidence) of every time s, each of shape [|𝒵|]."""

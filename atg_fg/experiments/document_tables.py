@@ -99,14 +99,6 @@ def _table1(document: Mapping[str, Any]) -> list[Table]:
     ]
 
 
-def _figure3(document: Mapping[str, Any]) -> list[Table]:
-    return [_curves("Success rate by number of actions", document["points"], "policy")]
-
-
-def _ablation(document: Mapping[str, Any]) -> list[Table]:
-    return [_curves(place, cells, "variant") for place, cells in places_of(document["cells"]).items()]
-
-
 def _curves(title: str, points: Sequence[Mapping[str, Any]], kind: str) -> Table:
     """Return success over the number of actions, one column a ``kind``."""
     names = list(dict.fromkeys(str(point[kind]) for point in points))
@@ -120,10 +112,6 @@ def _curves(title: str, points: Sequence[Mapping[str, Any]], kind: str) -> Table
 def _goal(document: Mapping[str, Any]) -> list[Table]:
     numbers = [(label, _number(document[name])) for name, label in _GOAL_NUMBERS.items()]
     return [_rates(*goal_rates(document)), Table("Numbers", ("", "value"), tuple(numbers))]
-
-
-def _reliability(document: Mapping[str, Any]) -> list[Table]:
-    return [_rates(*action_rates(document)), _rates(*detection_rates(document))]
 
 
 def _rates(title: str, rates: Mapping[str, Mapping[str, Any]]) -> Table:
@@ -215,11 +203,11 @@ def _number(value: float | None) -> str:
 #: Commands whose results have tables.
 TABLES: Final[Mapping[str, Callable[[Mapping[str, Any]], list[Table]]]] = {
     "table1": _table1,
-    "figure3": _figure3,
-    "ablation": _ablation,
+    "figure3": lambda document: [_curves("Success rate by number of actions", document["points"], "policy")],
+    "ablation": lambda document: [_curves(*place, "variant") for place in places_of(document["cells"]).items()],
     "goal": _goal,
     "compare": _compare,
     "rescore": _rescore,
     "calibrate": _calibrate,
-    "sim reliability": _reliability,
+    "sim reliability": lambda document: [_rates(*action_rates(document)), _rates(*detection_rates(document))],
 }

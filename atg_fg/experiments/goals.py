@@ -198,10 +198,7 @@ def run_many(
         for number in range(n_runs) if not resume else ():
             check_not_begun(_run_path(records, number))
 
-    def tell(_number: int, _served: tuple[ServedObject, ...]) -> None:
-        if on_run is not None:
-            on_run()
-
+    tell = None if on_run is None else lambda _number, _served: on_run()
     return run_pieces(partial(_run_and_save, plan, seed, records), range(n_runs), executor, jobs, tell)
 
 

@@ -9,8 +9,8 @@ from atg_fg.core.checks import brief, title_or
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.table import Table
 from atg_fg.experiments.figure3 import table_of_points
-from atg_fg.experiments.goal_scores import table_of_goals
-from atg_fg.experiments.scores import _comparison, table_of_tests
+from atg_fg.experiments.goal_scores import ServedObject, table_of_goals
+from atg_fg.experiments.scores import TestResult, _comparison, table_of_tests
 
 
 def results_table(results: Any, title: str = "") -> Table:
@@ -25,10 +25,6 @@ def results_table(results: Any, title: str = "") -> Table:
     Raises:
         InvalidInputError: There are none, or they are something else.
     """
-    # Not at the top: these modules let their own results show themselves by this one.
-    from atg_fg.experiments.goal_scores import ServedObject
-    from atg_fg.experiments.scores import TestResult
-
     title = title_or(title, "")
     if isinstance(results, TestResult):
         return table_of_tests([results], title)

@@ -64,14 +64,7 @@ class Rows(NamedTuple):
 
     def take(self, index: IntArray) -> Rows:
         """Return the rows with these indices."""
-        return Rows(
-            self.owner[index],
-            self.start[index],
-            self.pose[index],
-            self.weight[index],
-            self.table[index],
-            self.events[index],
-        )
+        return Rows._make(column[index] for column in self)
 
 
 class PoseFilter:

@@ -63,14 +63,6 @@ def _table1(document: Mapping[str, Any]) -> list[Plot]:
     return [Plot("Success of each test", "seed", SUCCESS, series, tuple(str(test["seed"]) for test in tests))]
 
 
-def _figure3(document: Mapping[str, Any]) -> list[Plot]:
-    return [_curves("Success rate by number of actions", document["points"], "policy")]
-
-
-def _ablation(document: Mapping[str, Any]) -> list[Plot]:
-    return [_curves(place, cells, "variant") for place, cells in places_of(document["cells"]).items()]
-
-
 def _curves(title: str, points: Sequence[Mapping[str, Any]], kind: str) -> Plot:
     """Return success over the number of actions, one curve a ``kind``."""
     found = {(point["actions"], str(point[kind])): point for point in points}
@@ -86,14 +78,6 @@ def _curves(title: str, points: Sequence[Mapping[str, Any]], kind: str) -> Plot:
         for name in dict.fromkeys(str(point[kind]) for point in points)
     ]
     return Plot(title, ACTIONS, f"{SUCCESS}, with 95 % Wilson intervals", tuple(series))
-
-
-def _goal(document: Mapping[str, Any]) -> list[Plot]:
-    return [_rates(*goal_rates(document))]
-
-
-def _reliability(document: Mapping[str, Any]) -> list[Plot]:
-    return [_rates(*action_rates(document)), _rates(*detection_rates(document))]
 
 
 def _rates(title: str, rates: Mapping[str, Mapping[str, Any]]) -> Plot:
@@ -153,11 +137,20 @@ def _scaled(rate: tuple[float, Sequence[float]]) -> tuple[float, float, float]:
 #: Commands whose results can be shown, with the page's heading.
 EXPERIMENTS: Final[Mapping[str, tuple[str, _Plots]]] = {
     "table1": ("Table 1", _table1),
-    "figure3": ("Figure 3", _figure3),
-    "ablation": ("What each part of the model adds", _ablation),
-    "goal": ("Reaching a goal", _goal),
+    "figure3": (
+        "Figure 3",
+        lambda document: [_curves("Success rate by number of actions", document["points"], "policy")],
+    ),
+    "ablation": (
+        "What each part of the model adds",
+        lambda document: [_curves(*place, "variant") for place in places_of(document["cells"]).items()],
+    ),
+    "goal": ("Reaching a goal", lambda document: [_rates(*goal_rates(document))]),
     "compare": ("Engines compared", _compare),
     "rescore": ("Recorded tests, judged by another model", _rescore),
     "calibrate": ("Calibration of an engine", _calibrate),
-    "sim reliability": ("Reliability of the robot", _reliability),
+    "sim reliability": (
+        "Reliability of the robot",
+        lambda document: [_rates(*action_rates(document)), _rates(*detection_rates(document))],
+    ),
 }

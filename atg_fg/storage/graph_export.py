@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, Final
 
 import networkx
 
-from atg_fg.core.aspect_graph import COLLECTION_NODE, AspectTransitionGraph
+from atg_fg.core.aspect_graph import COLLECTION_NODE
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -22,19 +22,12 @@ def pattern_text(slots: Sequence[str], pattern: Sequence[int | None]) -> str:
     return ", ".join(f"{slot} {'?' if symbol is None else symbol}" for slot, symbol in zip(slots, pattern, strict=True))
 
 
-def to_graphml(graph: AspectTransitionGraph) -> str:
-    """Return the ATG as GraphML text.
-
-    Nodes are "0", "1", … with ``pattern`` ("front 3, top 5"), and "collection" with ``size`` while aspects
-    are unobserved. Edges carry ``action``, ``count`` and ``observed``, as in ``graph.to_networkx()``.
-    Characters of a name that XML cannot hold become U+FFFD. Read it back with
-    ``networkx.parse_graphml(text, force_multigraph=True)``.
-    """
-    return view_to_graphml(graph.to_networkx(), graph.assumptions.alphabet.slots)
-
-
 def view_to_graphml(view: networkx.MultiDiGraph[Any], slots: Sequence[str]) -> str:
     """Return a view of an ATG as GraphML text, with the attributes that it has; those that are ``None`` are left out.
+
+    Nodes are "0", "1", … with ``pattern`` ("front 3, top 5"), and "collection" with ``size`` while aspects are
+    unobserved. Characters of a name that XML cannot hold become U+FFFD. Read it back with
+    ``networkx.parse_graphml(text, force_multigraph=True)``.
 
     Args:
         view: From ``graph.to_networkx()``, or a completed ATG (``atg_fg/learning/completion.py``).
@@ -50,19 +43,12 @@ def view_to_graphml(view: networkx.MultiDiGraph[Any], slots: Sequence[str]) -> s
     return "\n".join(networkx.generate_graphml(plain)) + "\n"
 
 
-def to_dot(graph: AspectTransitionGraph) -> str:
-    """Return the ATG as DOT text for Graphviz.
-
-    Observed edges are solid and labelled with action and count, unknown ones dotted; the collection node
-    is a double-bordered box with its size.
-    """
-    return view_to_dot(graph.to_networkx(), graph.assumptions.alphabet.slots)
-
-
 def view_to_dot(view: networkx.MultiDiGraph[Any], slots: Sequence[str]) -> str:
-    """Return a view of an ATG as DOT text; arguments are those of ``view_to_graphml``.
+    """Return a view of an ATG as DOT text for Graphviz; arguments are those of ``view_to_graphml``.
 
-    What a structure predicts is dashed, with its probability; a pose whose pattern is not known is dotted.
+    Observed edges are solid and labelled with action and count, unknown ones dotted; the collection node is a
+    double-bordered box with its size. What a structure predicts is dashed, with its probability; a pose whose pattern
+    is not known is dotted.
     """
     name = _quoted(view.graph["name"])
     lines = [

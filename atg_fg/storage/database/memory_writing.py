@@ -56,15 +56,17 @@ class Held:
 def held_by(connection: sqlite3.Connection, memory: RobotMemory) -> Held:
     """Return what a database holds from which this memory has just been read."""
     rows = connection.execute("SELECT name, id, position FROM graphs ORDER BY position").fetchall()
-    return Held(
-        {graph.name: graph for graph in memory},
-        {name: number for name, number, _ in rows},
-        {name: position for name, _, position in rows},
-        memory.merges,
-        _owners(memory),
-        _raw(memory),
-        _sensed(memory),
-    )
+    return _all_of(memory, {name: key for name, key, _ in rows}, {name: position for name, _, position in rows})
+
+
+def _all_of(memory: RobotMemory, ids: dict[str, int], positions: dict[str, int]) -> Held:
+    """Return what a database holds that has all of a memory, its ATGs in rows of these numbers and positions."""
+    graphs = {graph.name: graph for graph in memory}
+    sensed = () if memory.sense is None else tuple(memory.sense.trials)
+    if not isinstance(memory, StructuredMemory):
+        return Held(graphs, ids, positions, memory.merges, sensed=sensed)
+    owners, raw = tuple(memory.learner.owners), tuple(memory.learner.trials)
+    return Held(graphs, ids, positions, memory.merges, owners, raw, sensed)
 
 
 def replace_memory(connection: sqlite3.Connection, memory: RobotMemory) -> Held:
@@ -131,12 +133,11 @@ def write_changes(connection: sqlite3.Connection, memory: RobotMemory, held: Hel
         if held.graphs.get(name) is not graph:
             _clear_graph(connection, ids[name])
             _insert_graph(connection, ids[name], graph)
-    merges = _write_merges(connection, memory.merges, held.merges)
-    owners = _owners(memory)
+    _write_merges(connection, memory.merges, held.merges)
     if isinstance(memory, StructuredMemory):
-        _write_structure(connection, memory, owners, held, ids)
+        _write_structure(connection, memory, held, ids)
     _write_sense(connection, memory, held.sensed)
-    return Held(graphs, ids, positions, merges, owners, _raw(memory), _sensed(memory))
+    return _all_of(memory, ids, positions)
 
 
 def _placed(connection: sqlite3.Connection, names: Sequence[str], held: Held) -> tuple[dict[str, int], dict[str, int]]:
@@ -175,27 +176,20 @@ def _insert_graph(connection: sqlite3.Connection, number: int, graph: AspectTran
     connection.execute("UPDATE graphs SET measured = ? WHERE id = ?", (measured, number))
 
 
-def _write_merges(
-    connection: sqlite3.Connection, merges: tuple[Merge, ...], held: tuple[Merge, ...]
-) -> tuple[Merge, ...]:
+def _write_merges(connection: sqlite3.Connection, merges: tuple[Merge, ...], held: tuple[Merge, ...]) -> None:
     same = 0
     while same < min(len(merges), len(held)) and merges[same] is held[same]:
         same += 1
     connection.execute("DELETE FROM merges WHERE number >= ?", (same,))
     rows = ((same + index, _compact(write_merge(merge))) for index, merge in enumerate(merges[same:]))
     connection.executemany("INSERT INTO merges VALUES (?, ?)", rows)
-    return merges
 
 
 def _write_structure(
-    connection: sqlite3.Connection,
-    memory: StructuredMemory,
-    owners: tuple[str, ...],
-    before: Held,
-    ids: dict[str, int],
+    connection: sqlite3.Connection, memory: StructuredMemory, before: Held, ids: dict[str, int]
 ) -> None:
     """Write the structures in question anew, raw trials that are new, and what has changed of the others."""
-    held = before.owners
+    held, owners = before.owners, memory.learner.owners
     section = write_learner(memory.learner, len(held))
     new = section.pop("trials")
     evidence = write_evidence(memory)
@@ -237,18 +231,6 @@ def _write_sense(connection: sqlite3.Connection, memory: RobotMemory, held: tupl
         if number >= len(held) or trial != held[number]
     )
     connection.executemany("INSERT OR REPLACE INTO sensed_trials VALUES (?, ?)", rows)
-
-
-def _sensed(memory: RobotMemory) -> tuple[SensedTrial, ...]:
-    return () if memory.sense is None else tuple(memory.sense.trials)
-
-
-def _raw(memory: RobotMemory) -> tuple[RawTrial, ...]:
-    return tuple(memory.learner.trials) if isinstance(memory, StructuredMemory) else ()
-
-
-def _owners(memory: RobotMemory) -> tuple[str, ...]:
-    return tuple(memory.learner.owners) if isinstance(memory, StructuredMemory) else ()
 
 
 def _compact(value: Any) -> str:

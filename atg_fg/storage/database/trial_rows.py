@@ -11,18 +11,19 @@ from typing import Any, Final
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.checks import plain_text, whole_number
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.core.records import Experiment, TrialSummary
+from atg_fg.core.records import Experiment, StepSummary, TrialSummary
 from atg_fg.storage.checked_json import parse_json, plain_json, read_info
 from atg_fg.storage.trial_log import read_step, summary_of
 
 #: Rows that are read at once: no more than these are in RAM, and no writer waits for a reader.
 _PAGE: Final = 200
 
-#: Columns of a step, but for its number; those that hold JSON.
+#: Columns of a step, but for its number; those that hold JSON; columns of a trial.
 _STEP: Final = (
     "observed", "pattern", "unseen", "entropy", "log_evidence", "expected_entropy", "action", "purpose", "truth",
 )  # fmt: skip
 _DOCUMENTS: Final = ("observed", "expected_entropy", "truth")
+_TRIAL: Final = "experiment, number, verdict, matched, learned, learned_patterns, lost_truth, mistakes, mended"
 
 
 def add_experiment(connection: sqlite3.Connection, experiment: Experiment) -> int:
@@ -40,9 +41,7 @@ def add_trial(connection: sqlite3.Connection, trial: TrialSummary, experiment: i
         "SELECT coalesce(max(number) + 1, 0) FROM trials WHERE experiment IS ?", (experiment,)
     ).fetchone()
     row = connection.execute(
-        "INSERT INTO trials"
-        " (experiment, number, verdict, matched, learned, learned_patterns, lost_truth, mistakes, mended)"
-        " VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
+        f"INSERT INTO trials ({_TRIAL}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
         (
             experiment,
             number,
@@ -55,24 +54,16 @@ def add_trial(connection: sqlite3.Connection, trial: TrialSummary, experiment: i
             _optional(trial.mended or None),
         ),
     )
-    rows = (
-        (
-            row.lastrowid,
-            index,
-            canonical(step.observed),
-            step.pattern,
-            step.unseen,
-            step.entropy,
-            step.log_evidence,
-            _optional(step.expected_entropy),
-            step.action,
-            step.purpose,
-            canonical(step.truth),
-        )
-        for index, step in enumerate(trial.steps)
-    )
+    rows = ((row.lastrowid, index, *_values_of(step)) for index, step in enumerate(trial.steps))
     connection.executemany("INSERT INTO steps VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", rows)
     return int(number)
+
+
+def _values_of(step: StepSummary) -> Iterator[Any]:
+    """Yield what stands in the columns of a step."""
+    for name in _STEP:
+        value = getattr(step, name)
+        yield _optional(value) if name in _DOCUMENTS else value
 
 
 def added(connection: sqlite3.Connection, experiment: Experiment | None, trial: TrialSummary) -> Experiment | None:
@@ -215,8 +206,7 @@ def canonical(value: Any) -> str:
 
 
 def _trial(connection: sqlite3.Connection, key: int, place: str, assumptions: Assumptions | None) -> TrialSummary:
-    columns = "experiment, number, verdict, matched, learned, learned_patterns, lost_truth, mistakes, mended"
-    row = _row(connection, f"SELECT {columns} FROM trials WHERE id = ?", key, place)
+    row = _row(connection, f"SELECT {_TRIAL} FROM trials WHERE id = ?", key, place)
     experiment, number, verdict, matched, learned, patterns, lost, mistakes, mended = row
     steps = []
     question = f"SELECT number, {', '.join(_STEP)} FROM steps WHERE trial = ? ORDER BY number"
