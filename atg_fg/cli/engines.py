@@ -37,8 +37,7 @@ def compare(
         Path | None, typer.Option(help="A memory of your own; one of random cubes if not given.", show_default=False)
     ] = None,
     engines: Annotated[
-        str,
-        typer.Option(help=f"all, or a list such as gtsam,particle(n_particles=500). {', '.join(ENGINES)}."),
+        str, typer.Option(help=f"all, or a list such as gtsam,particle(n_particles=500). {', '.join(ENGINES)}.")
     ] = "all",
     objects: Annotated[int, typer.Option(help="Objects that exist.")] = 100,
     remembered: Annotated[int, typer.Option(help="Objects in the memory.")] = 20,

@@ -39,8 +39,7 @@ def export(
     file: options.MemoryFile,
     name: Annotated[str | None, typer.Option(help="The ATG to export; the first one if not given.")] = None,
     format_name: Annotated[
-        str,
-        typer.Option("--format", help=f"One of: {', '.join(EXPORTS)}; the last two are of the whole memory."),
+        str, typer.Option("--format", help=f"One of: {', '.join(EXPORTS)}; the last two are of the whole memory.")
     ] = "graphml",
     completed: Annotated[
         bool, typer.Option("--completed", help="Add the aspects and transitions that the learned structure predicts.")

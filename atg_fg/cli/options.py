@@ -138,10 +138,7 @@ Condition = Annotated[
 ]
 Urdf = Annotated[
     Path | None,
-    typer.Option(
-        help="Your own robot, URDF as NASA's or a mapping, TOML (world robonaut).",
-        rich_help_panel=WORLD,
-    ),
+    typer.Option(help="Your own robot, URDF as NASA's or a mapping, TOML (world robonaut).", rich_help_panel=WORLD),
 ]
 
 WorldOption = Annotated[

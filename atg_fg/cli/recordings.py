@@ -25,21 +25,9 @@ from atg_fg.experiments.scores import Score
 from atg_fg.learning.predictive_checks import summary_of_evidence, too_many_graphs
 from atg_fg.learning.structured_memory import StructuredMemory, memory_for
 from atg_fg.storage import plain_files
-from atg_fg.storage.memory_files import (
-    check_holds,
-    goes_to_database,
-    has_memory,
-    load_memory,
-    open_memory,
-    save_memory,
-)
+from atg_fg.storage.memory_files import check_holds, goes_to_database, has_memory, load_memory, open_memory, save_memory
 from atg_fg.storage.recording_oddities import oddities
-from atg_fg.storage.recordings import (
-    RecordingSpec,
-    merged_spec,
-    read_recording,
-    read_spec,
-)
+from atg_fg.storage.recordings import RecordingSpec, merged_spec, read_recording, read_spec
 
 RecordingFiles = Annotated[
     list[Path], typer.Argument(help="Recordings: CSV or JSON lines, gzipped or not.", show_default=False)
@@ -150,10 +138,7 @@ def recognise(
             "command": "recognise",
             "trials": [recorded_trials.trial_document(each) for each in found],
             "score": scored,
-            "warnings": [
-                *_warnings(kept, _evidence_of(kept), recordings),
-                *recorded_trials.improbable_trials(found),
-            ],
+            "warnings": [*_warnings(kept, _evidence_of(kept), recordings), *recorded_trials.improbable_trials(found)],
         }
         if write_page is not None and report is not None:
             write_page(found, kept, scored, report)

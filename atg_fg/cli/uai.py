@@ -63,10 +63,7 @@ def _note(note: str) -> None:
 
 def _partition(model: DiscreteModel, evidence: dict[int, int], limit: int) -> _Answer:
     logarithm = queries.log_partition(model, evidence, limit)
-    return repr(logarithm / math.log(10)), {
-        "log10_partition": logarithm / math.log(10),
-        "log_partition": logarithm,
-    }
+    return repr(logarithm / math.log(10)), {"log10_partition": logarithm / math.log(10), "log_partition": logarithm}
 
 
 def _marginals(model: DiscreteModel, evidence: dict[int, int], limit: int) -> _Answer:

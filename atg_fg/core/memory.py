@@ -184,10 +184,7 @@ class RobotMemory(Persistent):
         return [trial.owner for trial in trials]
 
     def _made_of(
-        self,
-        name: str,
-        trials: Iterable[tuple[Sequence[int | None], Sequence[int]]],
-        readings: Mapping[str, Moments],
+        self, name: str, trials: Iterable[tuple[Sequence[int | None], Sequence[int]]], readings: Mapping[str, Moments]
     ) -> AspectTransitionGraph:
         """Return the ATG that patterns and actions of some trials make, and what is kept of readings."""
         graph = AspectTransitionGraph(name, self.assumptions)

@@ -215,12 +215,7 @@ def plot_entropy(
 
 
 def _plot_expected(
-    axes: Axes,
-    rank: int,
-    n_actions: int,
-    action: str,
-    expected: Sequence[Mapping[str, float]],
-    chosen: Sequence[str],
+    axes: Axes, rank: int, n_actions: int, action: str, expected: Sequence[Mapping[str, float]], chosen: Sequence[str]
 ) -> list[Line2D]:
     """Mark what one action was expected to leave, just left of its outcome and apart from the others.
 

@@ -59,13 +59,7 @@ class GibbsSampling(WholeTrialInference):
     exact: ClassVar[bool] = False
 
     def __init__(
-        self,
-        setup: TrialSetup,
-        *,
-        n_chains: int = 8,
-        n_sweeps: int = 1000,
-        n_burn_in: int = 500,
-        seed: int = 0,
+        self, setup: TrialSetup, *, n_chains: int = 8, n_sweeps: int = 1000, n_burn_in: int = 500, seed: int = 0
     ) -> None:
         super().__init__(setup)
         self.n_chains = whole_number(n_chains, "n_chains", 2)

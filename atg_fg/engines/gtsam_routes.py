@@ -141,12 +141,7 @@ class _OrderedRoute(GtsamRoute):
         InvalidInputError: There is no such ordering.
     """
 
-    def __init__(
-        self,
-        setup: TrialSetup,
-        *,
-        ordering: str = "objects-last",
-    ) -> None:
+    def __init__(self, setup: TrialSetup, *, ordering: str = "objects-last") -> None:
         super().__init__(setup)
         self.ordering = one_of(ordering, "ordering", ORDERINGS)
 

@@ -75,12 +75,7 @@ class MeanField(SupportedInference):
     scaled_log_evidence: float = 0.0
 
     def __init__(
-        self,
-        setup: TrialSetup,
-        *,
-        floor: float = 1e-16,
-        max_iterations: int = 200,
-        tolerance: float = 1e-10,
+        self, setup: TrialSetup, *, floor: float = 1e-16, max_iterations: int = 200, tolerance: float = 1e-10
     ) -> None:
         super().__init__(setup)
         self.floor = number(floor, "floor", 1e-300, below=1e-3)

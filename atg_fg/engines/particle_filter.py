@@ -51,13 +51,7 @@ class ParticleFilter(SupportedInference):
     exact: ClassVar[bool] = False
     scaled_log_evidence: float = 0.0
 
-    def __init__(
-        self,
-        setup: TrialSetup,
-        *,
-        n_particles: int = 2000,
-        seed: int = 0,
-    ) -> None:
+    def __init__(self, setup: TrialSetup, *, n_particles: int = 2000, seed: int = 0) -> None:
         super().__init__(setup)
         self.n_particles = whole_number(n_particles, "n_particles", 1)
         self._rng = np.random.default_rng(whole_number(seed, "seed", 0))

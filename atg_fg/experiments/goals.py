@@ -112,11 +112,7 @@ class GoalRun:
         return table_of_goals(self.served)._repr_html_()
 
 
-def run_goals(
-    plan: GoalPlan,
-    seed: np.random.SeedSequence,
-    on_look: Callable[[World], None] | None = None,
-) -> GoalRun:
+def run_goals(plan: GoalPlan, seed: np.random.SeedSequence, on_look: Callable[[World], None] | None = None) -> GoalRun:
     """Learn a memory, set up the objects with random goals, and serve one after the other.
 
     Args:

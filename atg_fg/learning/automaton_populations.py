@@ -12,13 +12,7 @@ from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.learning import gibbs_kernels, kernels
 from atg_fg.learning.chain import Chain
 from atg_fg.learning.milestones import is_milestone
-from atg_fg.learning.populations import (
-    HOPELESS,
-    Conclusion,
-    Population,
-    Samples,
-    log_mean,
-)
+from atg_fg.learning.populations import HOPELESS, Conclusion, Population, Samples, log_mean
 from atg_fg.learning.raw_trials import Recording
 from atg_fg.learning.sampling_task import Structure, Task
 from atg_fg.learning.saved_chain import SavedChain

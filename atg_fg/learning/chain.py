@@ -57,13 +57,7 @@ class Chain:
     """
 
     def __init__(
-        self,
-        structure: Structure,
-        log_prior: float,
-        n_symbols: int,
-        *,
-        may_own: bool = False,
-        judges: bool = False,
+        self, structure: Structure, log_prior: float, n_symbols: int, *, may_own: bool = False, judges: bool = False
     ) -> None:
         self.may_own, self.judges = may_own, judges
         self.error = ERROR_PRIOR[0] / sum(ERROR_PRIOR)

@@ -59,10 +59,7 @@ class Duplicate:
 
 
 def find_duplicates(
-    memory: RobotMemory,
-    parameters: ModelParameters,
-    threshold: float | None = None,
-    of: Sequence[str] | None = None,
+    memory: RobotMemory, parameters: ModelParameters, threshold: float | None = None, of: Sequence[str] | None = None
 ) -> list[Duplicate]:
     """Return the pairs of ATGs whose log odds to be of one object are above a threshold, most probable first.
 

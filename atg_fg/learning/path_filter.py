@@ -213,12 +213,7 @@ class PathFilter:
         return paths, owners, weights / total[owners]
 
     def _shown(
-        self,
-        paths: IntArray,
-        owners: IntArray,
-        states: IntArray,
-        weights: FloatArray,
-        labels: FloatArray | None = None,
+        self, paths: IntArray, owners: IntArray, states: IntArray, weights: FloatArray, labels: FloatArray | None = None
     ) -> FloatArray:
         """Return Σ weight · p(pattern) of each owner when each path is in these states, shape [I, |𝒵|].
 

@@ -132,10 +132,7 @@ class StructureLooks:
         following = [self._followed(each, look) for each in before.following]
         total = plain.sum() + sum(each.belief.sum() for each in following)
         return StructureBelief(
-            model,
-            plain / total,
-            [Following(each.filter, each.belief / total) for each in following],
-            before.symbols,
+            model, plain / total, [Following(each.filter, each.belief / total) for each in following], before.symbols
         )
 
     def _followed(self, following: Following, look: int) -> Following:

@@ -25,12 +25,7 @@ N_TRIALS: Final = 24
 
 
 def search_registers(
-    trials: TrialArrays,
-    plain: FloatArray,
-    n_slots: int,
-    n_actions: int,
-    n_chains: int,
-    rng: np.random.Generator,
+    trials: TrialArrays, plain: FloatArray, n_slots: int, n_actions: int, n_chains: int, rng: np.random.Generator
 ) -> list[SharedStructure]:
     """Return the best structure of each chain, in canonical form, without repeats, best first.
 

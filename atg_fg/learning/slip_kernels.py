@@ -97,13 +97,7 @@ class _Work(NamedTuple):
 
 @compiled
 def slip_paths(
-    trials: TrialArrays,
-    trial: int,
-    done: IntArray,
-    clusters: Clusters,
-    free: int,
-    log_new: float,
-    log_odds: float,
+    trials: TrialArrays, trial: int, done: IntArray, clusters: Clusters, free: int, log_new: float, log_odds: float
 ) -> tuple[Paths, FloatArray]:
     """Follow all ways a trial may have gone, by the shared automaton, without the ones that become negligible.
 

@@ -13,15 +13,7 @@ from numpy.typing import NDArray
 
 from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.inference.kernels.compilation import compiled, compiled_within
-from atg_fg.learning.kernels import (
-    SMALL,
-    Clusters,
-    TrialArrays,
-    draw_by_logarithm,
-    learn_all_again,
-    shuffled,
-    walk,
-)
+from atg_fg.learning.kernels import SMALL, Clusters, TrialArrays, draw_by_logarithm, learn_all_again, shuffled, walk
 
 #: Likelihoods that may be multiplied into a table before it is normalised, lest they leave the range of numbers.
 _MOST_FACTORS = 16
@@ -132,13 +124,7 @@ def score_successors(
 
 @compiled_within
 def find_passes(
-    trials: TrialArrays,
-    clusters: Clusters,
-    automaton: int,
-    action: int,
-    state: int,
-    paths: IntArray,
-    work: _Work,
+    trials: TrialArrays, clusters: Clusters, automaton: int, action: int, state: int, paths: IntArray, work: _Work
 ) -> bool:
     """Fill in when each trial passes an entry first; return whether any does."""
     passes, is_passed, lengths, actions = work.passes, work.is_passed, trials.lengths, trials.actions

@@ -21,10 +21,7 @@ from atg_fg.inference.interface import Inference, TrialSetup
 from atg_fg.policies import Choice, Policy, as_policy, make_policy
 
 _LOOKS: Final = 5
-_PARAMETERS: Final = (
-    ModelParameters(0.1, 0.1, learn_in_trial=False),
-    ModelParameters(0.5, 0.05, learn_in_trial=True),
-)
+_PARAMETERS: Final = (ModelParameters(0.1, 0.1, learn_in_trial=False), ModelParameters(0.5, 0.05, learn_in_trial=True))
 
 
 class _Case(NamedTuple):
@@ -130,8 +127,7 @@ def _played(policy: Policy, case: _Case) -> list[tuple[Any, ...]]:
         _check_choice(choice, len(case.memory.assumptions.actions), place)
         require(_state(inference) == before, f"{place}: the engine has changed; expected that a policy only asks it")
         require(
-            of_all == shared_generators(),
-            f"{place}: a generator that all share was used; expected the trial's own",
+            of_all == shared_generators(), f"{place}: a generator that all share was used; expected the trial's own"
         )
         entropies = choice.expected_entropies
         choices.append((choice.action, None if entropies is None else entropies.tolist(), choice.purpose))

@@ -62,12 +62,7 @@ def read_trial_record(text: str, path: Path, memory: RobotMemory | None) -> Repo
     end = _holding(_holding(last, place, "verdict")["verdict"], f"{place}: verdict", "outcome", "matched", "truth")
     lost = end["truth"] if end["outcome"] == "lost" else None
     trial = summary_of(
-        {
-            "verdict": end["outcome"],
-            "matched": end["matched"],
-            "lost_truth": lost,
-            "mistakes": end.get("mistakes", []),
-        },
+        {"verdict": end["outcome"], "matched": end["matched"], "lost_truth": lost, "mistakes": end.get("mistakes", [])},
         [step for step, _ in looks],
         f"{place}: verdict",
     )

@@ -26,10 +26,7 @@ APPEARANCE, SEEN = "appearance", "seen"
 def appearance_space(n_slots: int, n_features: int) -> spaces.Dict:
     """Return the space of observations that have features of each slot that is seen."""
     return spaces.Dict(
-        {
-            APPEARANCE: spaces.Box(-np.inf, np.inf, (n_slots, n_features), np.float64),
-            SEEN: spaces.MultiBinary(n_slots),
-        }
+        {APPEARANCE: spaces.Box(-np.inf, np.inf, (n_slots, n_features), np.float64), SEEN: spaces.MultiBinary(n_slots)}
     )
 
 

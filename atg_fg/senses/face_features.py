@@ -118,10 +118,7 @@ def rectified(frame: Image, corners: FloatArray, size: int = CROP) -> Image:
     return np.asarray(cv2.warpPerspective(frame, homography, (size, size), flags=cv2.INTER_AREA), dtype=np.uint8)
 
 
-_FEATURES: Final[dict[str, FaceFeatures]] = {
-    DEFAULT_FEATURES: colours_and_gradients,
-    VIEW_FEATURES: view_features,
-}
+_FEATURES: Final[dict[str, FaceFeatures]] = {DEFAULT_FEATURES: colours_and_gradients, VIEW_FEATURES: view_features}
 
 
 def face_features(name: str) -> FaceFeatures:

@@ -98,10 +98,7 @@ class TurnWatcher:
     """
 
     def __init__(
-        self,
-        actions: Mapping[str, FloatArray],
-        viewpoint: Viewpoint | None = None,
-        patience: Patience | None = None,
+        self, actions: Mapping[str, FloatArray], viewpoint: Viewpoint | None = None, patience: Patience | None = None
     ) -> None:
         self.patience = patience or Patience()
         self.viewpoint = viewpoint or Viewpoint.pitched(USUAL_PITCH)

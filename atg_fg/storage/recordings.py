@@ -154,10 +154,7 @@ def completed(recording: Recording, spec: RecordingSpec) -> Recording:
         raise InvalidInputError(
             f"{recording.place}: slots {listed(recording.slots)}; expected {listed(spec.slots or ())}"
         )
-    for kind, found, known in (
-        ("label", recording.labels, spec.labels),
-        ("action", recording.actions, spec.actions),
-    ):
+    for kind, found, known in (("label", recording.labels, spec.labels), ("action", recording.actions, spec.actions)):
         for name in found:
             if known is not None and name not in known:
                 raise InvalidInputError(f"{recording.place}: {kind} {brief(name)}; expected one of: {listed(known)}")

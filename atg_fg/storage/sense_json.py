@@ -24,11 +24,7 @@ def write_sense(sense: Sense, assumptions: Assumptions) -> dict[str, Any]:
 
 def write_settings(sense: AppearanceSense) -> dict[str, Any]:
     """Return all of a sense but what it has learned."""
-    return {
-        **sense.space.to_document(),
-        "within": sense.codebook.within,
-        "concentration": sense.codebook.concentration,
-    }
+    return {**sense.space.to_document(), "within": sense.codebook.within, "concentration": sense.codebook.concentration}
 
 
 def write_sensed_trial(trial: SensedTrial, assumptions: Assumptions) -> dict[str, Any]:

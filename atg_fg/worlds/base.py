@@ -156,9 +156,4 @@ class FiniteStateWorld(gymnasium.Env[IntArray, np.int64], ABC):
         return self._pattern()
 
     def _truth(self, *, slipped: bool) -> dict[str, Any]:
-        return {
-            "object": self.object,
-            self.state_name: self.state,
-            "pattern": self._pattern(),
-            "slipped": slipped,
-        }
+        return {"object": self.object, self.state_name: self.state, "pattern": self._pattern(), "slipped": slipped}

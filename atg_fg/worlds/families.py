@@ -115,8 +115,7 @@ def lid_boxes(n_objects: int, seed: int, *, n_symbols: int = 12) -> ObjectFamily
         tags = rng.permutation(n_symbols)[: _N_WALLS + 2].tolist()
         walls, tops = tags[:_N_WALLS], tags[_N_WALLS:]
         return FiniteObject(
-            mechanism,
-            tuple((walls[front], walls[(front + 1) % _N_WALLS], tops[is_open]) for is_open, front in states),
+            mechanism, tuple((walls[front], walls[(front + 1) % _N_WALLS], tops[is_open]) for is_open, front in states)
         )
 
     objects = _different(n_objects, draw, _generator(seed))

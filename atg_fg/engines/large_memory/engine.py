@@ -63,12 +63,7 @@ class LargeMemory(Inference):
     exact: ClassVar[bool] = False
     takes_uncertain_actions: ClassVar[bool] = False
 
-    def __init__(
-        self,
-        setup: TrialSetup,
-        *,
-        n_exact: int = 100,
-    ) -> None:
+    def __init__(self, setup: TrialSetup, *, n_exact: int = 100) -> None:
         super().__init__(setup)
         for sense in self.memory.assumptions.object_senses:
             raise InvalidInputError(f"engine 'large-memory': senses of the object, {sense.name!r}; expected none")

@@ -214,11 +214,7 @@ def writing(path: Path | str, *, create: bool = False, wait: float = WAIT) -> It
 
     Arguments and errors are those of ``open_to_write`` and ``translated``.
     """
-    with (
-        translated(path),
-        closing(open_to_write(path, create=create, wait=wait)) as connection,
-        written(connection),
-    ):
+    with translated(path), closing(open_to_write(path, create=create, wait=wait)) as connection, written(connection):
         yield connection
 
 

@@ -238,10 +238,7 @@ def _compact(value: Any) -> str:
 
 
 def save_database(
-    memory: RobotMemory,
-    path: Path | str,
-    trials: tuple[TrialSummary, ...] = (),
-    experiment: Experiment | None = None,
+    memory: RobotMemory, path: Path | str, trials: tuple[TrialSummary, ...] = (), experiment: Experiment | None = None
 ) -> None:
     """Save a memory in place of the one that a database holds, if any; its records of trials stay.
 

@@ -63,10 +63,7 @@ _VERSION_3: Final = (
     "CREATE TABLE sensed_trials (number INTEGER PRIMARY KEY, document TEXT NOT NULL)",
 )
 
-_VERSION_4: Final = (
-    "ALTER TABLE trials ADD COLUMN mistakes TEXT",
-    "ALTER TABLE trials ADD COLUMN mended TEXT",
-)
+_VERSION_4: Final = ("ALTER TABLE trials ADD COLUMN mistakes TEXT", "ALTER TABLE trials ADD COLUMN mended TEXT")
 
 _VERSION_5: Final = (
     "CREATE TABLE symbols (number INTEGER PRIMARY KEY, name TEXT NOT NULL UNIQUE)",
