@@ -12,8 +12,7 @@ from atg_fg.cli import options
 from atg_fg.cli.terminal import say
 from atg_fg.core.checks import MANY, whole_number
 from atg_fg.core.errors import InvalidInputError, unknown_name
-from atg_fg.core.memory import RobotMemory
-from atg_fg.core.recordings import Recording, assumptions_for
+from atg_fg.core.recordings import assumptions_for
 from atg_fg.display import figures
 from atg_fg.display.comparison_plot import plot_comparison
 from atg_fg.engines import ENGINES, engine_for
@@ -75,7 +74,8 @@ def compare(
         given |= {"preset": preset, "slip": slip, "wrong": wrong, "missing": missing, "seed": seed}
         title = f"{trials} trials of {actions} actions, {remembered} of {objects} objects remembered, preset {preset}"
     else:
-        held, recording = _memory_and_recording(memory, trials)
+        held, recording = load_memory(memory), read_recording(trials)
+        held = held.extended(assumptions_for(recording, held.assumptions).alphabet.names)
         with options.progress_bar("trials", len(recording.trials)) as advance:
             records = engine_comparison.compare_engines(names, held, recording.trials, parameters, advance)
         given = {"trials": trials, "memory": str(memory), "preset": preset}
@@ -96,12 +96,6 @@ def _number_of_trials(trials: str) -> int:
             f"--trials: {trials!r}; expected a number, or a recording together with --memory"
         ) from None
     return whole_number(number, "--trials", 1, MANY)
-
-
-def _memory_and_recording(memory: Path, trials: str) -> tuple[RobotMemory, Recording]:
-    """Return a memory that knows all labels of a recording, and the recording."""
-    held, recording = load_memory(memory), read_recording(trials)
-    return held.extended(assumptions_for(recording, held.assumptions).alphabet.names), recording
 
 
 @app.command()

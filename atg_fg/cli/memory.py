@@ -129,11 +129,13 @@ def show(file: options.MemoryFile, json_file: options.JsonFile = None) -> None:
     if memory is not None:
         assumptions = memory.assumptions
         document |= {"n_objects": assumptions.n_objects, "n_aspects": assumptions.n_aspects, "objects": _rows(memory)}
-    options.write_json({**document, **records}, json_file)
-    if json_file == "-":
+    if not options.write_json({**document, **records}, json_file):
         return
     if memory is not None:
-        _print_objects(f"{file}: {len(memory)} of {memory.assumptions.n_objects} objects", document["objects"])
+        title = f"{file}: {len(memory)} of {memory.assumptions.n_objects} objects"
+        headings = ("object", "aspects", "unobserved", "edges", "transitions seen", "unknown edges")
+        rows = (tuple(map(str, row.values())) for row in document["objects"])
+        options.print_tables([Table(title, headings, tuple(rows))])
     for each in records.get("experiments", ()):
         say(f"{each['kind']}, seed {each['seed']}, atg-fg {each['version']}: {each['trials']} trials")
 
@@ -151,11 +153,6 @@ def _rows(memory: RobotMemory) -> list[dict[str, Any]]:
         }
         for graph in memory
     ]
-
-
-def _print_objects(title: str, rows: list[dict[str, Any]]) -> None:
-    headings = ("object", "aspects", "unobserved", "edges", "transitions seen", "unknown edges")
-    options.print_tables([Table(title, headings, tuple(tuple(map(str, row.values())) for row in rows))])
 
 
 def _records(file: Path) -> dict[str, Any]:

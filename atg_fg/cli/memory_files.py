@@ -203,7 +203,8 @@ def _told(found: dict[str, Any]) -> list[str]:
     lines += [f"+ {name}" for name in found.get("only_second", ())]
     lines += [f"{old} is called {new}" for old, new in found.get("renamed", {}).items()]
     for name, changes in found.get("changed", {}).items():
-        told = [f"{what.replace('_', ' ')} {_number(value)}" for what, value in changes.items()]
+        numbers = {what: len(value) if isinstance(value, list) else value for what, value in changes.items()}
+        told = [f"{what.replace('_', ' ')} {number}" for what, number in numbers.items()]
         lines.append(f"{name}: {', '.join(told)}")
     if "order" in found:
         lines.append("the objects are in another order")
@@ -211,10 +212,6 @@ def _told(found: dict[str, Any]) -> list[str]:
         lines.append("merges: {} / {}".format(*found["merges"]))
     lines += [f"structure: {name}: {one} / {two}" for name, (one, two) in found.get("structure", {}).items()]
     return lines
-
-
-def _number(value: Any) -> Any:
-    return len(value) if isinstance(value, list) else value
 
 
 def compact(

@@ -10,7 +10,7 @@ import typer
 from atg_fg.cli import options
 from atg_fg.experiments.document_tables import tables_of
 from atg_fg.experiments.rescore import rescore as judged_anew
-from atg_fg.experiments.scores import pooled_interval
+from atg_fg.experiments.scores import SCORES, pooled_interval
 from atg_fg.storage.recorded_test import recorded_tests
 
 
@@ -32,9 +32,7 @@ def rescore(
     tests = [
         {
             "file": file,
-            "identification": list(result.identification),
-            "recognition": list(result.recognition),
-            "success": list(result.success),
+            **{name: list(getattr(result, name)) for name in SCORES},
             "interval95": list(pooled_interval([result], "success")),
         }
         for file, result in results.items()

@@ -110,15 +110,8 @@ def trial(
             experiment = Experiment("trial", about, seed, __version__)
             save_trial(remembered, save_memory, TrialSummary.of(result, learned), experiment)
     steps = [json.loads(line) for line in lines.splitlines()[1:-1]]
-    document = {
-        "command": "trial",
-        "parameters": header,
-        "steps": steps,
-        "outcome": result.verdict,
-        "judged_novel": result.judged_novel,
-        "matched": result.matched,
-        "learned": learned,
-    }
+    ending = {"outcome": result.verdict, "judged_novel": result.judged_novel, "matched": result.matched}
+    document = {"command": "trial", "parameters": header, "steps": steps, **ending, "learned": learned}
     options.write_json(document, json_file)
 
 

@@ -251,14 +251,8 @@ class Evidence:
         object.__setattr__(self, "likelihood", read_only(np.array(self.likelihood, dtype=np.float64)))
 
     def __reduce__(self) -> tuple[type, tuple[Any, ...]]:
-        return Evidence, (
-            self.likelihood,
-            self.pattern,
-            self.detection,
-            self.confidences,
-            self.slots,
-            self.measured,
-        )  # so that no copy can be written to, either
+        given = (self.likelihood, self.pattern, self.detection, self.confidences, self.slots, self.measured)
+        return Evidence, given  # so that no copy can be written to, either
 
     @classmethod
     def of_detection(

@@ -183,14 +183,9 @@ class TrialRecord:
         rows = [_step_row(number, step, self) for number, step in enumerate(self.steps)]
         ending = f"{self.verdict}{_of(self.matched)}" if rows else "nothing seen yet"
         title = f"Trial of {len(self.actions)} actions: {ending}"
-        headings = (
-            "look",
-            f"seen ({', '.join(self.assumptions.alphabet.slots)})",
-            "most probable object",
-            "",
-            "unseen",
-        )
-        return Table(title, (*headings, "entropy, nats", "then"), shortened(rows, _LOOKS, "looks"))
+        seen = f"seen ({', '.join(self.assumptions.alphabet.slots)})"
+        headings = ("look", seen, "most probable object", "", "unseen", "entropy, nats", "then")
+        return Table(title, headings, shortened(rows, _LOOKS, "looks"))
 
     def _repr_html_(self) -> str:
         return self.table()._repr_html_()
@@ -311,15 +306,8 @@ class TrialSummary:
         patterns: tuple[int | None, ...] | None = tuple(learned_patterns)
         if patterns == tuple(record.patterns):
             patterns = None
-        return cls(
-            record.verdict,
-            record.matched,
-            tuple(steps),
-            record.lost_truth,
-            learned,
-            patterns,
-            mistakes=tuple(record.mistakes),
-        )
+        verdict, mistakes = (record.verdict, record.matched), tuple(record.mistakes)
+        return cls(*verdict, tuple(steps), record.lost_truth, learned, patterns, mistakes=mistakes)
 
     @property
     def patterns(self) -> tuple[int | None, ...]:

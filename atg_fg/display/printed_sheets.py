@@ -144,15 +144,8 @@ def _page(title: str, how: str, paper: str) -> tuple[Figure, Axes]:
     axes.set(xlim=(0, width), ylim=(0, height), autoscale_on=False)
     axes.axis("off")
     axes.text(width / 2, height - _BORDER - 4, title, ha="center", va="center", fontsize=8, parse_math=False)
-    axes.text(
-        width / 2,
-        height - _BORDER - 8.5,
-        f"print at 100 %, not fitted to the page; {how}",
-        ha="center",
-        va="center",
-        fontsize=6.5,
-        color="0.4",
-    )
+    advice = f"print at 100 %, not fitted to the page; {how}"
+    axes.text(width / 2, height - _BORDER - 8.5, advice, ha="center", va="center", fontsize=6.5, color="0.4")
     _draw_ruler(axes, width)
     return figure, axes
 

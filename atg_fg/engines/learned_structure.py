@@ -212,7 +212,7 @@ class LearnedStructure(BayesFilter):
         """
         plain, *others = self._type_beliefs()
         kinds: list[tuple[str, FloatArray, Callable[[int], tuple[Chain, IntArray] | None]]] = [
-            (PLAIN_WORDS, plain, self._plain_chain)
+            (PLAIN_WORDS, plain, lambda hypothesis: (self.chain(hypothesis), self.model.pattern_of[hypothesis]))
         ]
         kinds += [
             (each.words, belief, partial(each.chain, history=self.history))
@@ -231,9 +231,6 @@ class LearnedStructure(BayesFilter):
                     probability = float(belief[hypothesis]) * path.probability
                     found.append(KindExplanation(words, hypothesis, patterns, probability))
         return sorted(found, key=lambda each: -each.probability)[:k]
-
-    def _plain_chain(self, hypothesis: int) -> tuple[Chain, IntArray] | None:
-        return self.chain(hypothesis), self.model.pattern_of[hypothesis]
 
     def _beliefs(self) -> tuple[list[FloatArray], float, list[FloatArray]]:
         """Return ln p(O, type, z_0:t | a_1:t), ln p(z_0:t | a_1:t) but for its scale, and p(O, type | z_0:t, a_1:t).

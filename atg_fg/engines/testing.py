@@ -5,6 +5,7 @@ from __future__ import annotations
 import pickle
 from collections.abc import Callable
 from copy import copy
+from functools import partial
 from typing import Any, Final, NamedTuple
 
 import numpy as np
@@ -88,15 +89,11 @@ def check_engine(
     worst = Deviation()
     for number in range(cases):
         case = _drawn_case(number, np.random.default_rng((seed, number)), sure=not found.takes_uncertain_actions)
-        begin = _beginner(found, case, options)
+        begin = partial(begin_trial, found, case.memory, case.parameters, case.prior, **options)
         worst = _compared(found, begin, case, tolerance, worst)
         _check_refusals(begin(), case)
         _check_copies(begin, case)
     return worst
-
-
-def _beginner(engine: type[Inference], case: _Case, options: dict[str, Any]) -> Callable[[], Inference]:
-    return lambda: begin_trial(engine, case.memory, case.parameters, case.prior, **options)
 
 
 def _compared(

@@ -144,14 +144,9 @@ def run_goals(plan: GoalPlan, seed: np.random.SeedSequence, on_look: Callable[[W
             # All objects are different: this one is none of those that were served before.
             prior = identity_given_others(memory_prior, beliefs)
             inference = begin_trial(plan.engine, memory, plan.parameters, prior=prior)
-            record = run_trial(
-                AtStation(world, station),
-                inference,
-                goal_policy,
-                plan.n_actions,
-                np.random.default_rng(station_seed),
-                on_step=None if on_look is None else lambda _: on_look(world),
-            )
+            there, rng = AtStation(world, station), np.random.default_rng(station_seed)
+            on_step = None if on_look is None else lambda _: on_look(world)
+            record = run_trial(there, inference, goal_policy, plan.n_actions, rng, on_step=on_step)
             beliefs.append(record.belief.with_prior(memory_prior, instead_of=prior))
             reached = record.lost_truth is None and goal_policy.is_reached(inference)
             learns = plan.parameters.learn_in_trial

@@ -241,11 +241,8 @@ class LiveSession:
             yield Noted("it was not seen how the cube was turned: the trial ends here, and another begins")
             yield from self.end()
         if self._trial is None:
-            self._trial, self._at_rest, turn = (
-                LiveTrial(self._agent, ExplorationPolicy() if self.learns else None),
-                {},
-                (),
-            )
+            self._trial = LiveTrial(self._agent, ExplorationPolicy() if self.learns else None)
+            self._at_rest, turn = {}, ()
         elif turn:
             self._trial.acted([self.memory.assumptions.action_index(name) for name in turn])
             self._at_rest = {}

@@ -79,7 +79,8 @@ def unite(first: RobotMemory, second: RobotMemory) -> Union:
             f"merge: {first.assumptions} and {second.assumptions}; expected two memories under the same assumptions"
         )
     sense = _united_sense(first.sense, second.sense)
-    same = [name for name in second.names if name in first.names and _is_one(first[name], second[name])]
+    both = {name: (first[name], second[name]) for name in second.names if name in first.names}
+    same = [name for name, (one, other) in both.items() if holds(one, other) or holds(other, one)]
     further = [name for name in same if not holds(first[name], second[name])]
     one = _Part(first, [name for name in first.names if name not in further])
     two = _Part(second, [name for name in second.names if name not in same or name in further])
@@ -126,10 +127,6 @@ def holds(more: AspectTransitionGraph, less: AspectTransitionGraph) -> bool:
     return more.pattern_indices[: less.n_known] == less.pattern_indices and all(
         counts.get(edge, 0) >= number for edge, number in less.counts.items()
     )
-
-
-def _is_one(graph: AspectTransitionGraph, other: AspectTransitionGraph) -> bool:
-    return holds(graph, other) or holds(other, graph)
 
 
 def _kept_in_the_end(memory: RobotMemory, name: str) -> str:

@@ -12,7 +12,15 @@ from atg_fg.core.memory import RobotMemory
 from atg_fg.core.merging import Merge
 from atg_fg.core.patterns import PatternAlphabet
 from atg_fg.learning.structured_memory import StructuredMemory
-from atg_fg.storage.checked_json import check_format, parse_json, placed, read_entries, read_list, read_object
+from atg_fg.storage.checked_json import (
+    check_format,
+    parse_json,
+    placed,
+    read_entries,
+    read_list,
+    read_object,
+    without_none,
+)
 from atg_fg.storage.evidence_json import read_evidence, write_evidence
 from atg_fg.storage.object_sense_json import read_moments, read_object_senses, write_moments, write_object_sense
 from atg_fg.storage.sense_json import read_sense, write_sense
@@ -128,22 +136,21 @@ def read_assumptions(value: Any, place: str) -> Assumptions:
 
 def write_assumptions(assumptions: Assumptions) -> dict[str, Any]:
     """Return assumptions as JSON knows them."""
-    return {
-        "n_objects": assumptions.n_objects,
-        "n_aspects": assumptions.n_aspects,
-        "actions": list(assumptions.actions),
-        "slots": list(assumptions.alphabet.slots),
-        "n_symbols": assumptions.alphabet.n_symbols,
-        # Left out where it is as usual: what was written before has no word of it.
-        **({} if assumptions.alphabet.exclusive else {"exclusive": False}),
-        **({"symbols": list(assumptions.alphabet.names)} if assumptions.alphabet.names else {}),
-        **({"open": True} if assumptions.alphabet.is_open else {}),
-        **(
-            {"object_senses": [write_object_sense(each) for each in senses]}
-            if (senses := assumptions.object_senses)
-            else {}
-        ),
-    }
+    alphabet = assumptions.alphabet
+    return without_none(
+        {
+            "n_objects": assumptions.n_objects,
+            "n_aspects": assumptions.n_aspects,
+            "actions": list(assumptions.actions),
+            "slots": list(alphabet.slots),
+            "n_symbols": alphabet.n_symbols,
+            # Left out where it is as usual: what was written before has no word of it.
+            "exclusive": None if alphabet.exclusive else False,
+            "symbols": list(alphabet.names) or None,
+            "open": alphabet.is_open or None,
+            "object_senses": [write_object_sense(each) for each in assumptions.object_senses] or None,
+        }
+    )
 
 
 def read_memory(value: Any, assumptions: Assumptions, place: str) -> RobotMemory:

@@ -39,10 +39,7 @@ def read_preset(text: str, place: str) -> ModelParameters:
         return ModelParameters(**values)
 
 
-def _packaged(name: str) -> ModelParameters:
-    file = files("atg_fg.storage").joinpath("data", f"{name}.json")
-    return read_preset(file.read_text(encoding="utf-8"), f"{name}.json")
-
+_ROBOT: Final = (files("atg_fg.storage") / "data" / "robot.json").read_text(encoding="utf-8")
 
 #: ``paper`` takes the paper at its word, and assumes next to no noise; ``default`` also learns within the trial;
 #: ``robot`` assumes the noise that was measured on the simulated robot; ``learned`` is ``default`` for objects that may
@@ -50,7 +47,7 @@ def _packaged(name: str) -> ModelParameters:
 PRESETS: Final[Mapping[str, ModelParameters]] = {
     "paper": ModelParameters(1e-8, 1e-8, learn_in_trial=False),
     "default": ModelParameters(1e-8, 1e-8, learn_in_trial=True),
-    "robot": _packaged("robot"),
+    "robot": read_preset(_ROBOT, "robot.json"),
     "learned": ModelParameters(1e-8, 1e-8, learn_in_trial=True, learn_structure=True),
 }
 

@@ -176,7 +176,11 @@ def write_recording(recording: Recording, path: Path | str) -> None:
     Raises:
         InvalidInputError: The file cannot be written.
     """
-    text = _to_lines(recording) if str(path).endswith(".jsonl") else write_csv(recording)
+    if str(path).endswith(".jsonl"):
+        lines = [header_of(recording), *map(trial_document, recording.trials)]
+        text = "".join(f"{json.dumps(line)}\n" for line in lines)
+    else:
+        text = write_csv(recording)
     write_bytes_atomically(path, text.encode())
 
 
@@ -315,11 +319,6 @@ def _read_measured(value: Any, spec: RecordingSpec, place: str) -> Measured:
         for name, reading in readings.items()
     }
     return tuple((name, known[name].check(value, place) if name in known else value) for name, value in found.items())
-
-
-def _to_lines(recording: Recording) -> str:
-    lines = [header_of(recording), *map(trial_document, recording.trials)]
-    return "".join(f"{json.dumps(line)}\n" for line in lines)
 
 
 def header_of(recording: Recording) -> dict[str, Any]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Any, NamedTuple, NoReturn
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 
@@ -18,6 +18,8 @@ from atg_fg.core.memory import RobotMemory
 from atg_fg.core.merging import Merge
 from atg_fg.core.open_alphabets import Relabelling
 from atg_fg.core.patterns import IntArray, Measured
+
+_NO_MERGES: Final = "merge: a compact memory keeps no record of merges; expected a memory file in JSON"
 
 
 class GraphArrays(NamedTuple):
@@ -58,7 +60,7 @@ class CompactMemory(RobotMemory):
 
     def __init__(self, assumptions: Assumptions, graphs: Iterable[AspectTransitionGraph] = ()) -> None:
         super().__init__(assumptions)
-        self._fill((), _no_graphs(assumptions))
+        self._fill((), _arrays_of((), assumptions))
         for sense in assumptions.object_senses:
             raise InvalidInputError(f"compact memory: senses of the object, {sense.name!r}; expected none")
         graphs = list(graphs)
@@ -201,7 +203,7 @@ class CompactMemory(RobotMemory):
         Raises:
             InvalidInputError: Always.
         """
-        self._refuse_merges()
+        raise InvalidInputError(_NO_MERGES)
 
     def unmerge(self, name: str) -> None:
         """Refuse: a compact memory keeps no record of merges.
@@ -209,10 +211,7 @@ class CompactMemory(RobotMemory):
         Raises:
             InvalidInputError: Always.
         """
-        self._refuse_merges()
-
-    def _refuse_merges(self) -> NoReturn:
-        raise InvalidInputError("merge: a compact memory keeps no record of merges; expected a memory file in JSON")
+        raise InvalidInputError(_NO_MERGES)
 
     def _under(self, assumptions: Assumptions, labels: Relabelling) -> CompactMemory:
         return CompactMemory.of(super()._under(assumptions, labels))
@@ -325,10 +324,6 @@ def _types_of(assumptions: Assumptions) -> tuple[type[np.integer[Any]], ...]:
     local = least_type(assumptions.n_aspects)
     actions = least_type(len(assumptions.actions))
     return local, least_type(len(assumptions.alphabet)), np.uint16, local, actions, local, np.uint16
-
-
-def _no_graphs(assumptions: Assumptions) -> GraphArrays:
-    return _arrays_of([], assumptions)
 
 
 def _arrays_of(graphs: Sequence[AspectTransitionGraph], assumptions: Assumptions) -> GraphArrays:

@@ -9,7 +9,6 @@ from pathlib import Path
 
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.core.memory import RobotMemory
 from atg_fg.learning.structured_memory import StructuredMemory
 from atg_fg.storage.database.connection import open_to_read, translated
 from atg_fg.storage.database.memory_reading import holds_memory, read_memory_rows
@@ -54,13 +53,10 @@ def _references(connection: sqlite3.Connection, place: str) -> Iterator[str]:
 
 
 def _memory(connection: sqlite3.Connection, place: str) -> Iterator[str]:
-    if holds_memory(connection):
-        memory = read_memory_rows(connection, place)
-        yield from _strange_records(connection, place, memory)
-
-
-def _strange_records(connection: sqlite3.Connection, place: str, memory: RobotMemory) -> Iterator[str]:
-    """Yield what trials that this memory learned from say that does not fit it."""
+    """Read the memory, if there is one, and yield what trials that it learned from say that does not fit it."""
+    if not holds_memory(connection):
+        return
+    memory = read_memory_rows(connection, place)
     names = {*memory.names, *(merge.dropped.name for merge in memory.merges)}
     if isinstance(memory, StructuredMemory):  # an ATG all of whose trials turned out to be of others is no more
         names |= {each.old for each in memory.reassignments}
