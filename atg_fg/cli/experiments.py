@@ -52,47 +52,30 @@ def table1(
     executor: options.Executor = "process",
     records: Annotated[
         Path | None,
-        typer.Option(
-            writable=True,
-            help="Folder, or database (.db), in which every trial is saved as it ends.",
-            rich_help_panel=options.RUNNING,
-        ),
+        options.in_running(writable=True, help="Folder, or database (.db), in which every trial is saved as it ends."),
     ] = None,
     crops: Annotated[
         bool,
-        typer.Option(
-            "--crops",
-            help="Keep beside --records a picture of each class that a trial shows, of boxes with pictures.",
-            rich_help_panel=options.RUNNING,
+        options.in_running(
+            "--crops", help="Keep beside --records a picture of each class that a trial shows, of boxes with pictures."
         ),
     ] = False,
     smoothed_learning: Annotated[
-        bool,
-        typer.Option(
-            "--smoothed-learning",
-            help="Learn what is probable given all evidence of a trial.",
-            rich_help_panel=options.MODEL,
-        ),
+        bool, options.in_model("--smoothed-learning", help="Learn what is probable given all evidence of a trial.")
     ] = False,
     merge_duplicates: Annotated[
         bool,
-        typer.Option(
-            "--merge-duplicates",
-            help="After each trial, merge ATGs that are probably of one object.",
-            rich_help_panel=options.MODEL,
-        ),
+        options.in_model("--merge-duplicates", help="After each trial, merge ATGs that are probably of one object."),
     ] = False,
     save_memories: Annotated[
         Path | None,
-        typer.Option(
+        options.in_running(
             writable=True,
             help="Folder in which the memory of each test is saved at its end; a database (.db) for one test.",
-            rich_help_panel=options.RUNNING,
         ),
     ] = None,
     resume: Annotated[
-        bool,
-        typer.Option("--resume", help="Go on after the trials that --records holds.", rich_help_panel=options.RUNNING),
+        bool, options.in_running("--resume", help="Go on after the trials that --records holds.")
     ] = False,
     json_file: options.JsonFile = None,
 ) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Any, Final
 
@@ -19,9 +20,9 @@ from atg_fg.policies import POLICIES
 from atg_fg.policies.goal import ENTROPY_THRESHOLD, PLANNERS
 from atg_fg.worlds.base import World
 
-#: Panels of the help page beside those in ``options``.
-_MEMORY: Final = "The memory, learned beforehand"
-_GOAL: Final = "Reaching the goal"
+#: Options in panels of the help page beside those in ``options``.
+_in_memory: Final = partial(typer.Option, rich_help_panel="The memory, learned beforehand")
+_in_goal: Final = partial(typer.Option, rich_help_panel="Reaching the goal")
 #: How worlds with a camera are filmed: by an observer, or by what is detected at each look.
 RENDER_MODES: Final = {"rendered": "detections", "robonaut": "rgb_array_list"}
 
@@ -30,49 +31,27 @@ def goal(
     world: options.ARcubeWorld = "ideal",
     engine: options.PresetsEngine = None,
     preset: options.Preset = "default",
-    cubes: Annotated[
-        int, typer.Option(min=1, help="Cubes before the robot, each at a station.", rich_help_panel=options.WORLD)
-    ] = 3,
+    cubes: Annotated[int, options.in_world(min=1, help="Cubes before the robot, each at a station.")] = 3,
     memory_cubes: Annotated[
-        int,
-        typer.Option(min=1, help="Cubes that the memory is learned from, these among them.", rich_help_panel=_MEMORY),
+        int, _in_memory(min=1, help="Cubes that the memory is learned from, these among them.")
     ] = 20,
     learning_actions: Annotated[
-        int,
-        typer.Option(
-            help=f"Actions on each cube while the memory is learned; {COMPLETE} makes it complete.",
-            rich_help_panel=_MEMORY,
-        ),
+        int, _in_memory(help=f"Actions on each cube while the memory is learned; {COMPLETE} makes it complete.")
     ] = 20,
-    learning_policy: Annotated[
-        str, typer.Option(help=f"Policy then: {', '.join(POLICIES)}.", rich_help_panel=_MEMORY)
-    ] = "explore",
-    learning_world: Annotated[
-        str, typer.Option(help="World in which the memory is learned.", rich_help_panel=_MEMORY)
-    ] = "ideal",
-    planner: Annotated[
-        str, typer.Option(help=f"How a way is found: {', '.join(PLANNERS)}.", rich_help_panel=_GOAL)
-    ] = "attempts",
+    learning_policy: Annotated[str, _in_memory(help=f"Policy then: {', '.join(POLICIES)}.")] = "explore",
+    learning_world: Annotated[str, _in_memory(help="World in which the memory is learned.")] = "ideal",
+    planner: Annotated[str, _in_goal(help=f"How a way is found: {', '.join(PLANNERS)}.")] = "attempts",
     unreachable: Annotated[
-        str,
-        typer.Option(
-            help="A goal that no known path leads to: declare (say so and stop) or explore.", rich_help_panel=_GOAL
-        ),
+        str, _in_goal(help="A goal that no known path leads to: declare (say so and stop) or explore.")
     ] = "declare",
     settled: Annotated[
-        float, typer.Option(help="Entropy of identity below which a cube is recognised, nats.", rich_help_panel=_GOAL)
+        float, _in_goal(help="Entropy of identity below which a cube is recognised, nats.")
     ] = ENTROPY_THRESHOLD,
     trials: Annotated[
-        int,
-        typer.Option(
-            min=1,
-            max=MANY,
-            help="Runs, each with a memory, cubes and goals of its own.",
-            rich_help_panel=options.TRIALS,
-        ),
+        int, options.in_trials(min=1, max=MANY, help="Runs, each with a memory, cubes and goals of its own.")
     ] = 20,
-    actions: Annotated[int, typer.Option(help="Actions on each cube, at most.", rich_help_panel=options.TRIALS)] = 40,
-    seed: Annotated[int, typer.Option(min=0, help="Seed of all runs.", rich_help_panel=options.TRIALS)] = 0,
+    actions: Annotated[int, options.in_trials(help="Actions on each cube, at most.")] = 40,
+    seed: Annotated[int, options.in_trials(min=0, help="Seed of all runs.")] = 0,
     slip: options.Slip = 0.0,
     wrong: options.Wrong = 0.0,
     missing: options.Missing = 0.0,
@@ -81,21 +60,11 @@ def goal(
     jobs: options.Jobs = None,
     executor: options.Executor = "process",
     records: Annotated[
-        Path | None,
-        typer.Option(
-            writable=True, help="Folder in which every run is saved as it ends.", rich_help_panel=options.RUNNING
-        ),
+        Path | None, options.in_running(writable=True, help="Folder in which every run is saved as it ends.")
     ] = None,
-    resume: Annotated[
-        bool, typer.Option("--resume", help="Leave out the runs that --records holds.", rich_help_panel=options.RUNNING)
-    ] = False,
+    resume: Annotated[bool, options.in_running("--resume", help="Leave out the runs that --records holds.")] = False,
     video: Annotated[
-        Path | None,
-        typer.Option(
-            writable=True,
-            help="Film the first run into this .gif: a world with a camera.",
-            rich_help_panel=options.RUNNING,
-        ),
+        Path | None, options.in_running(writable=True, help="Film the first run into this .gif: a world with a camera.")
     ] = None,
     json_file: options.JsonFile = None,
 ) -> None:

@@ -7,6 +7,7 @@ import os
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
+from functools import partial
 from itertools import zip_longest
 from pathlib import Path
 from typing import Annotated, Any
@@ -40,74 +41,49 @@ def _checked_entropy(settled: Any) -> Any:
     return None if settled is None else check_entropy_threshold(settled, "--settled")
 
 
-#: Panels of the help page; what is in none of them stands in the first one, without a name.
-WORLD, MODEL, TRIALS, RUNNING = "World", "Model", "Trials", "Running"
+#: Options in the panels of the help page; what is in none of them stands in the first one, without a name.
+in_world, in_model, in_trials, in_running = (
+    partial(typer.Option, rich_help_panel=panel) for panel in ("World", "Model", "Trials", "Running")
+)
 
 MemoryFile = Annotated[Path, typer.Argument(help="A memory: JSON, or a database.", show_default=False)]
-World = Annotated[
-    str, typer.Option(help=f"World: {', '.join(WORLDS)}, or module:namespace/Id-v0 of your own.", rich_help_panel=WORLD)
-]
+World = Annotated[str, in_world(help=f"World: {', '.join(WORLDS)}, or module:namespace/Id-v0 of your own.")]
 DemoWorld = Annotated[
     str,
-    typer.Option(
-        help=f"World of ARcubes: {', '.join(ARCUBE_WORLDS)}, or module:namespace/Id-v0 of your own; or picture-box.",
-        rich_help_panel=WORLD,
+    in_world(
+        help=f"World of ARcubes: {', '.join(ARCUBE_WORLDS)}, or module:namespace/Id-v0 of your own; or picture-box."
     ),
 ]
 ARcubeWorld = Annotated[
-    str,
-    typer.Option(
-        help=f"World of ARcubes: {', '.join(ARCUBE_WORLDS)}, or module:namespace/Id-v0 of your own.",
-        rich_help_panel=WORLD,
-    ),
+    str, in_world(help=f"World of ARcubes: {', '.join(ARCUBE_WORLDS)}, or module:namespace/Id-v0 of your own.")
 ]
 Engine = Annotated[str, typer.Option(help=f"Inference engine: {', '.join(ENGINES)}.")]
 PresetsEngine = Annotated[
-    str | None,
-    typer.Option(
-        help=f"Inference engine: {', '.join(ENGINES)}. The preset's usual one if not given.", rich_help_panel=MODEL
-    ),
+    str | None, in_model(help=f"Inference engine: {', '.join(ENGINES)}. The preset's usual one if not given.")
 ]
-Preset = Annotated[
-    str,
-    typer.Option(help=f"Model parameters: {', '.join(PRESETS)}, or a .json file of your own.", rich_help_panel=MODEL),
-]
-Policy = Annotated[
-    str, typer.Option(help=f"Policy: {', '.join(POLICIES)}, or module:object of your own.", rich_help_panel=MODEL)
-]
+Preset = Annotated[str, in_model(help=f"Model parameters: {', '.join(PRESETS)}, or a .json file of your own.")]
+Policy = Annotated[str, in_model(help=f"Policy: {', '.join(POLICIES)}, or module:object of your own.")]
 Settled = Annotated[
     float | None,
-    typer.Option(
+    in_trials(
         help="End a trial when the entropy of the verdict is at most this, nats; --actions is then the most.",
-        rich_help_panel=TRIALS,
         callback=_checked_entropy,
     ),
 ]
-Seed = Annotated[int, typer.Option(min=0, help="Seed; test number k uses seed + k.", rich_help_panel=TRIALS)]
-Actions = Annotated[int, typer.Option(min=1, max=MANY, help="Actions a trial.", rich_help_panel=TRIALS)]
-Tests = Annotated[int, typer.Option(min=1, max=MANY, help="Number of tests.", rich_help_panel=TRIALS)]
-Trials = Annotated[int, typer.Option(min=1, max=MANY, help="Trials a test.", rich_help_panel=TRIALS)]
+Seed = Annotated[int, in_trials(min=0, help="Seed; test number k uses seed + k.")]
+Actions = Annotated[int, in_trials(min=1, max=MANY, help="Actions a trial.")]
+Tests = Annotated[int, in_trials(min=1, max=MANY, help="Number of tests.")]
+Trials = Annotated[int, in_trials(min=1, max=MANY, help="Trials a test.")]
 Jobs = Annotated[
     int | None,
-    typer.Option(
-        min=1,
-        help="Processes or threads; the result is the same for any number. All processors if not given.",
-        rich_help_panel=RUNNING,
-    ),
+    in_running(min=1, help="Processes or threads; the result is the same for any number. All processors if not given."),
 ]
 Executor = Annotated[
-    str,
-    typer.Option(
-        help=f"Where tests or runs are done: {EXECUTORS}; the result is the same anywhere.", rich_help_panel=RUNNING
-    ),
+    str, in_running(help=f"Where tests or runs are done: {EXECUTORS}; the result is the same anywhere.")
 ]
 Log = Annotated[
     Path | None,
-    typer.Option(
-        writable=True,
-        help="Keep each test in this .jsonl file as it ends, and leave out those in it.",
-        rich_help_panel=RUNNING,
-    ),
+    in_running(writable=True, help="Keep each test in this .jsonl file as it ends, and leave out those in it."),
     plain_files.check_writable,
 ]
 JsonFile = Annotated[
@@ -120,33 +96,17 @@ Plot = Annotated[
     typer.Option(writable=True, help="Draw the result into this .png, .svg or .pdf file."),
     figures.check_figure_path,
 ]
-Slip = Annotated[
-    float, typer.Option(help="Probability that an action fails and the object stays as it is.", rich_help_panel=WORLD)
-]
-Wrong = Annotated[
-    float, typer.Option(help="Probability that a look shows a pattern drawn at random.", rich_help_panel=WORLD)
-]
-Missing = Annotated[
-    float, typer.Option(help="Probability, a slot, that its symbol is not detected.", rich_help_panel=WORLD)
-]
+Slip = Annotated[float, in_world(help="Probability that an action fails and the object stays as it is.")]
+Wrong = Annotated[float, in_world(help="Probability that a look shows a pattern drawn at random.")]
+Missing = Annotated[float, in_world(help="Probability, a slot, that its symbol is not detected.")]
 Condition = Annotated[
-    str | None,
-    typer.Option(
-        help="What the robot works under: nominal or worn (world robonaut; nominal if not given).",
-        rich_help_panel=WORLD,
-    ),
+    str | None, in_world(help="What the robot works under: nominal or worn (world robonaut; nominal if not given).")
 ]
-Urdf = Annotated[
-    Path | None,
-    typer.Option(help="Your own robot, URDF as NASA's or a mapping, TOML (world robonaut).", rich_help_panel=WORLD),
-]
+Urdf = Annotated[Path | None, in_world(help="Your own robot, URDF as NASA's or a mapping, TOML (world robonaut).")]
 
 WorldOption = Annotated[
     list[str] | None,
-    typer.Option(
-        help="An option of the world's own, NAME=VALUE, such as n_successors=1; may be given again.",
-        rich_help_panel=WORLD,
-    ),
+    in_world(help="An option of the world's own, NAME=VALUE, such as n_successors=1; may be given again."),
 ]
 
 
