@@ -57,12 +57,14 @@ def calibrate(
     """
     from atg_fg.senses.camera_calibration import CalibrationBoard
     from atg_fg.senses.camera_calibration import calibrate as measure
+    from atg_fg.senses.video import read_image
     from atg_fg.storage.camera_files import write_calibration
 
     if bool(pictures) == (video is not None):
         raise InvalidInputError("camera calibrate: expected pictures of the board, or --video FILE")
     board = CalibrationBoard(columns, rows, square / 1000, tag / 1000, dictionary)
-    found = measure(_frames(video) if video is not None else _images(pictures or []), board)
+    images = ((str(picture), read_image(picture)) for picture in pictures or [])
+    found = measure(images if video is None else _frames(video), board)
     document = write_calibration(found)
     options.write_json(document, str(output))
     if options.write_json({"command": "camera calibrate", "output": str(output), "calibration": document}, json_file):
@@ -71,13 +73,6 @@ def calibrate(
             f"the field of view is {found.field_of_view:.1f} degrees"
         )
         say(f"saved: {output}")
-
-
-def _images(paths: list[Path]) -> Iterator[tuple[str, NDArray[np.uint8]]]:
-    from atg_fg.senses.video import read_image
-
-    for path in paths:
-        yield str(path), read_image(path)
 
 
 def _frames(video: Path) -> Iterator[tuple[str, NDArray[np.uint8]]]:

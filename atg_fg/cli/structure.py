@@ -62,7 +62,11 @@ def structure(
         figures.save_figure(figure, plot)
     document = _document(learned, believed, completed)
     if name is not None:
-        document["completed"] = _graph_document(completed[name])
+        nodes, edges = completed[name].nodes(data=True), completed[name].edges(data=True)
+        document["completed"] = {
+            "aspects": [{"id": node, **data} for node, data in nodes],
+            "transitions": [{"from": source, "to": target, **data} for source, target, data in edges],
+        }
     if options.write_json(document, json_file):
         _tell(file, document)
 
@@ -159,14 +163,6 @@ def _mode_document(
     return {
         "sources": {action: [names[source] for source in sources] for action, (_, sources) in steps.items()},
         "next": {action: following for action, (following, _) in steps.items()},
-    }
-
-
-def _graph_document(graph: CompletedGraph) -> dict[str, Any]:
-    """Return a completed ATG as JSON knows it."""
-    return {
-        "aspects": [{"id": node, **data} for node, data in graph.nodes(data=True)],
-        "transitions": [{"from": source, "to": target, **data} for source, target, data in graph.edges(data=True)],
     }
 
 

@@ -177,12 +177,10 @@ class BeliefTable:
             rest = max(0.0, 1.0 - self.unseen - sum(value for _, value in best))
             rows.append((f"{others} {'other' if others == 1 else 'others'}", _probability(rest)))
         rows.append((f"unseen ({self.belief.n_unseen} never met)", _probability(self.unseen)))
-        note = f"entropy {self.belief.entropy:.3f} nats; judged {self._verdict()}"
+        known = self.belief.most_probable_object
+        verdict = "novel" if self.belief.is_novel or known is None else f"known, {self.names[known]}"
+        note = f"entropy {self.belief.entropy:.3f} nats; judged {verdict}"
         return Table("Belief over identity", ("object", "probability"), tuple(rows), note)
-
-    def _verdict(self) -> str:
-        best = self.belief.most_probable_object
-        return "novel" if self.belief.is_novel or best is None else f"known, {self.names[best]}"
 
     def _repr_html_(self) -> str:
         return self.table()._repr_html_()

@@ -27,20 +27,9 @@ COMPACT_FORMAT: Final = "atg-fg/compact-memory"
 
 #: What NumPy raises on files that are no sound archives of arrays.
 _UNSOUND: Final = (
-    OSError,
-    ValueError,
-    KeyError,
-    EOFError,
-    MemoryError,
-    OverflowError,
-    SyntaxError,
-    RecursionError,
-    tokenize.TokenError,
-    TypeError,
-    NotImplementedError,
-    zipfile.BadZipFile,
-    zlib.error,
-)
+    OSError, ValueError, KeyError, EOFError, MemoryError, OverflowError, SyntaxError, RecursionError, TypeError,
+    NotImplementedError, tokenize.TokenError, zipfile.BadZipFile, zlib.error,
+)  # fmt: skip
 
 #: How files of arrays are told from others.
 SUFFIX: Final = ".npz"

@@ -9,7 +9,7 @@ import numpy as np
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.checks import GREATEST, number, plain_text
 from atg_fg.core.errors import InvalidInputError
-from atg_fg.core.sense import Reading, Sense, SensedTrial
+from atg_fg.core.sense import Sense, SensedTrial
 from atg_fg.senses.appearance import AppearanceSense
 from atg_fg.senses.feature_space import FeatureSpace
 from atg_fg.storage.checked_json import placed, read_entries, read_list, read_object
@@ -75,7 +75,7 @@ def _read_trial(value: Any, assumptions: Assumptions, n_dimensions: int, place: 
     readings = []
     for look, where in looks["readings"]:
         slots = read_entries(look, where, len(assumptions.alphabet.slots))
-        readings.append(tuple(_reading(slot, place_of_slot, n_dimensions) for slot, place_of_slot in slots))
+        readings.append(tuple(slot if slot is None else tuple(_numbers(slot, at, n_dimensions)) for slot, at in slots))
     detections = []
     for (look, where), read in zip(looks["classes"], readings, strict=True):
         detection = assumptions.alphabet.check_detection(read_list(look, where), where)
@@ -85,10 +85,6 @@ def _read_trial(value: Any, assumptions: Assumptions, n_dimensions: int, place: 
         detections.append(detection)
     owner = plain_text(fields["object"], f"{place}.object")
     return SensedTrial(owner, tuple(readings), tuple(detections), tuple(actions))
-
-
-def _reading(value: Any, place: str, length: int) -> Reading:
-    return None if value is None else tuple(_numbers(value, place, length))
 
 
 def _numbers(value: Any, place: str, length: int) -> list[float]:

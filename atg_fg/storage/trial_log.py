@@ -68,15 +68,10 @@ def from_line(line: Any, place: str, assumptions: Assumptions | None = None) -> 
     if len(actions) not in ((looks,) if lost else (looks - 1, looks)):
         raise InvalidInputError(f"{place}: {looks} looks, {len(actions)} actions; expected one look more")
     actions += [None] * (looks - len(actions))
+    lengths = {**dict.fromkeys(("unseen", "entropy", "purpose", "crops"), looks), "truth": looks + lost}
     columns = {
         name: read_list(fields[name] if name in fields else [None] * looks, f"{place}: {name}", length)
-        for name, length in (
-            ("unseen", looks),
-            ("entropy", looks),
-            ("purpose", looks),
-            ("crops", looks),
-            ("truth", looks + lost),
-        )
+        for name, length in lengths.items()
     }
     steps = [
         read_step(

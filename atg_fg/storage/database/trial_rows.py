@@ -40,19 +40,10 @@ def add_trial(connection: sqlite3.Connection, trial: TrialSummary, experiment: i
     (number,) = connection.execute(
         "SELECT coalesce(max(number) + 1, 0) FROM trials WHERE experiment IS ?", (experiment,)
     ).fetchone()
+    documents = (trial.learned_patterns, trial.lost_truth, trial.mistakes or None, trial.mended or None)
     row = connection.execute(
         f"INSERT INTO trials ({_TRIAL}) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
-        (
-            experiment,
-            number,
-            trial.verdict,
-            trial.matched,
-            trial.learned,
-            _optional(trial.learned_patterns),
-            _optional(trial.lost_truth),
-            _optional(trial.mistakes or None),
-            _optional(trial.mended or None),
-        ),
+        (experiment, number, trial.verdict, trial.matched, trial.learned, *map(_optional, documents)),
     )
     rows = ((row.lastrowid, index, *_values_of(step)) for index, step in enumerate(trial.steps))
     connection.executemany("INSERT INTO steps VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)", rows)
