@@ -152,14 +152,7 @@ class MemoryTables:
 
 def _part(tables: Tables, n_rows: int, n_edges: int) -> Tables:
     """Return the first rows and edges of tables, as views."""
-    return Tables(
-        tables.n_known[:n_rows],
-        tables.pattern[:n_rows],
-        tables.begins[:n_rows],
-        tables.edges[:n_edges],
-        tables.counted[:n_edges],
-        tables.probability[:n_edges],
-    )
+    return Tables._make([*(each[:n_rows] for each in tables[:3]), *(each[:n_edges] for each in tables[3:])])
 
 
 def types_for(assumptions: Assumptions) -> Types:
@@ -191,11 +184,7 @@ def with_more_room(tables: Tables, room: int, n_aspects: int) -> Tables:
     types = (tables.n_known.dtype.type, tables.pattern.dtype.type)
     more = empty_tables(n_rows, int((n_edges + room).sum()), max(width, before), tables.begins.shape[1] - 1, types)
     there, here = positions(starts, n_edges), positions(tables.begins[:, 0], n_edges)
-    for old, new in (
-        (tables.edges, more.edges),
-        (tables.counted, more.counted),
-        (tables.probability, more.probability),
-    ):
+    for old, new in zip(tables[3:], more[3:], strict=True):
         new[there] = old[here]
     more.pattern[:, :before] = tables.pattern
     more.begins[...] = tables.begins + (starts - tables.begins[:, 0])[:, None]
