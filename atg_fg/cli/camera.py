@@ -35,9 +35,7 @@ def _group() -> None:
 
 @app.command()
 def calibrate(
-    pictures: Annotated[
-        list[Path] | None, typer.Argument(help="Pictures of the board, each from elsewhere.", show_default=False)
-    ] = None,
+    pictures: Annotated[list[Path] | None, options.argument(help="Pictures of the board, each from elsewhere.")] = None,
     video: Annotated[Path | None, typer.Option(help="A video of the board instead of pictures.")] = None,
     columns: Columns = 7,
     rows: Rows = 5,

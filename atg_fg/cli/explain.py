@@ -25,7 +25,7 @@ LEAST_SHOWN: Final = 1e-3
 
 
 def explain(
-    file: Annotated[Path, typer.Argument(help="A scripted trial (JSON).", show_default=False)],
+    file: Annotated[Path, options.argument(help="A scripted trial (JSON).")],
     k: Annotated[int, typer.Option("--k", min=1, help="How many explanations, the most probable first.")] = 5,
     samples: Annotated[int, typer.Option(min=0, help="How many explanations to draw from the posterior.")] = 0,
     smooth: Annotated[bool, typer.Option("--smooth", help="Add p(X_t | all evidence) of every look.")] = False,

@@ -32,7 +32,7 @@ if TYPE_CHECKING:
 
 
 def look(
-    images: Annotated[list[Path], typer.Argument(help="Photographs, PNG or JPEG.", show_default=False)],
+    images: Annotated[list[Path], options.argument(help="Photographs, PNG or JPEG.")],
     tags: TagsFile = None,
     dictionary: Dictionary = None,
     tag_size: TagSize = 45.0,

@@ -75,8 +75,8 @@ def unmerge(
 
 def rename(
     file: options.MemoryFile,
-    old: Annotated[str, typer.Argument(help="Name of an ATG.", show_default=False)],
-    new: Annotated[str, typer.Argument(help="The name that it is to have.", show_default=False)],
+    old: Annotated[str, options.argument(help="Name of an ATG.")],
+    new: Annotated[str, options.argument(help="The name that it is to have.")],
 ) -> None:
     """Give an object another name; all that was learned stays with it.
 
@@ -163,9 +163,7 @@ def _records(file: Path) -> dict[str, Any]:
 
 
 @app.command()
-def example(
-    output: Annotated[Path, typer.Argument(writable=True, help="File to write (JSON).", show_default=False)],
-) -> None:
+def example(output: Annotated[Path, options.argument(writable=True, help="File to write (JSON).")]) -> None:
     """Write the memory that comes with atg-fg: cubes, learned in 30 trials of 10 actions with the preset learned.
 
     Example: atg-fg memory example cubes.json
@@ -203,9 +201,7 @@ def _check(file: Path, json_file: str | None) -> int:
 
 
 @app.command()
-def repair(
-    file: Annotated[Path, typer.Argument(help="A database.", show_default=False)], json_file: options.JsonFile = None
-) -> None:
+def repair(file: Annotated[Path, options.argument(help="A database.")], json_file: options.JsonFile = None) -> None:
     """Take trials that cannot be read out of a database, and put on record there what they were.
 
     All trials of a test after a bad one follow from it, and are taken out, too; table1 --resume runs them again.

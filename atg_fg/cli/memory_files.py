@@ -96,8 +96,7 @@ def _trials_text(file: Path) -> str:
 
 def import_files(
     files: Annotated[
-        list[Path],
-        typer.Argument(help="Memories (JSON or databases), and logs of trials (.jsonl.gz).", show_default=False),
+        list[Path], options.argument(help="Memories (JSON or databases), and logs of trials (.jsonl.gz).")
     ],
     into: Annotated[
         Path, typer.Option(writable=True, help="The database; made if it is not there.", show_default=False)
@@ -134,8 +133,8 @@ def _import(files: list[Path], into: Path) -> None:
 
 
 def merge(
-    first: Annotated[Path, typer.Argument(help="A memory; its names stay.", show_default=False)],
-    second: Annotated[Path, typer.Argument(help="Another memory.", show_default=False)],
+    first: Annotated[Path, options.argument(help="A memory; its names stay.")],
+    second: Annotated[Path, options.argument(help="Another memory.")],
     output: Annotated[
         Path,
         typer.Option("--output", "-o", writable=True, help="The new file.", show_default=False),
@@ -182,8 +181,8 @@ def _save_with_records(memory: RobotMemory, output: Path, first: Path, second: P
 
 
 def diff(
-    first: Annotated[Path, typer.Argument(help="A memory.", show_default=False)],
-    second: Annotated[Path, typer.Argument(help="Another memory.", show_default=False)],
+    first: Annotated[Path, options.argument(help="A memory.")],
+    second: Annotated[Path, options.argument(help="Another memory.")],
     json_file: options.JsonFile = None,
 ) -> int:
     """Say what the second memory has otherwise than the first; leave with status 1 if there is anything.

@@ -45,8 +45,10 @@ def _checked_entropy(settled: Any) -> Any:
 in_world, in_model, in_trials, in_running = (
     partial(typer.Option, rich_help_panel=panel) for panel in ("World", "Model", "Trials", "Running")
 )
+#: An argument of a command; it has no default that a help page could show.
+argument = partial(typer.Argument, show_default=False)
 
-MemoryFile = Annotated[Path, typer.Argument(help="A memory: JSON, or a database.", show_default=False)]
+MemoryFile = Annotated[Path, argument(help="A memory: JSON, or a database.")]
 World = Annotated[str, in_world(help=f"World: {', '.join(WORLDS)}, or module:namespace/Id-v0 of your own.")]
 DemoWorld = Annotated[
     str,

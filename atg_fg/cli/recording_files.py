@@ -31,7 +31,7 @@ app = typer.Typer(
 
 @app.command()
 def check(
-    file: Annotated[Path, typer.Argument(help="A recording: CSV or JSON lines.", show_default=False)],
+    file: Annotated[Path, options.argument(help="A recording: CSV or JSON lines.")],
     objects: Objects = None,
     slots: Slots = None,
     actions: Actions = None,
@@ -75,10 +75,7 @@ def check(
 @app.command()
 def convert(
     file: Annotated[
-        Path,
-        typer.Argument(
-            help="A recording, CSV or JSON lines; a bag of ROS; or the name of a dataset.", show_default=False
-        ),
+        Path, options.argument(help="A recording, CSV or JSON lines; a bag of ROS; or the name of a dataset.")
     ],
     output: Output,
     topics: Annotated[
@@ -117,7 +114,7 @@ def convert(
 
 @app.command()
 def export(
-    file: Annotated[Path, typer.Argument(help="A recording: CSV or JSON lines.", show_default=False)],
+    file: Annotated[Path, options.argument(help="A recording: CSV or JSON lines.")],
     name: Annotated[str, typer.Option(help="Of the new dataset, such as robot/looks-v0.", show_default=False)],
     to: Annotated[Literal["minari"], typer.Option(help="What it is written for.")] = "minari",
     objects: Objects = None,

@@ -29,9 +29,7 @@ from atg_fg.storage.memory_files import check_holds, goes_to_database, has_memor
 from atg_fg.storage.recording_oddities import oddities
 from atg_fg.storage.recordings import RecordingSpec, merged_spec, read_recording, read_spec
 
-RecordingFiles = Annotated[
-    list[Path], typer.Argument(help="Recordings: CSV or JSON lines, gzipped or not.", show_default=False)
-]
+RecordingFiles = Annotated[list[Path], options.argument(help="Recordings: CSV or JSON lines, gzipped or not.")]
 Spec = Annotated[Path | None, typer.Option(help="JSON file that says what the recordings do not.")]
 Slots = Annotated[str | None, typer.Option(help="Columns that are slots, such as front,top.")]
 Actions = Annotated[str | None, typer.Option(help="All actions that there are, such as rotate,tip.")]

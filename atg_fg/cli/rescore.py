@@ -5,8 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Annotated
 
-import typer
-
 from atg_fg.cli import options
 from atg_fg.experiments.document_tables import tables_of
 from atg_fg.experiments.rescore import rescore as judged_anew
@@ -15,9 +13,7 @@ from atg_fg.storage.recorded_test import recorded_tests
 
 
 def rescore(
-    files: Annotated[
-        list[Path], typer.Argument(help="Tests that table1 --records wrote: logs or a database.", show_default=False)
-    ],
+    files: Annotated[list[Path], options.argument(help="Tests that table1 --records wrote: logs or a database.")],
     preset: options.Preset = "learned",
     engine: options.PresetsEngine = None,
     json_file: options.JsonFile = None,

@@ -125,7 +125,7 @@ def _opened(memory: Path | None, save_memory: Path | None) -> RobotMemory | None
 
 
 def replay(
-    files: Annotated[list[Path], typer.Argument(help="Scripted trials (JSON).", show_default=False)],
+    files: Annotated[list[Path], options.argument(help="Scripted trials (JSON).")],
     engine: options.Engine = "gtsam",
     smooth: Annotated[bool, typer.Option("--smooth", help="Add p(X_t | all evidence) of every look.")] = False,
     table: Annotated[bool, typer.Option("--table", help="Print a table for people instead of JSON.")] = False,

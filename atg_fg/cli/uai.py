@@ -31,7 +31,7 @@ _Answer = tuple[str, dict[str, Any]]
 
 @app.command()
 def solve(
-    model: Annotated[Path, typer.Argument(help="A model in the UAI format.", show_default=False)],
+    model: Annotated[Path, options.argument(help="A model in the UAI format.")],
     task: Annotated[
         str, typer.Option(help="MAR: marginals; PR: log10 of the partition function; MPE: most probable explanation.")
     ],
@@ -88,7 +88,7 @@ TASKS: dict[str, Callable[[DiscreteModel, dict[int, int], int], _Answer]] = {
 
 @app.command()
 def export(
-    script: Annotated[Path, typer.Argument(help="A scripted trial (JSON).", show_default=False)],
+    script: Annotated[Path, options.argument(help="A scripted trial (JSON).")],
     model: Annotated[
         Path,
         typer.Option(writable=True, help="Write the trial's factor graph to this file."),
