@@ -121,6 +121,18 @@ class IdentityBelief:
         return max(0.0, -float(x_log_x(self.probabilities).sum()))
 
 
+def entropies(beliefs: Sequence[IdentityBelief]) -> list[float]:
+    """Return H(O) of each belief in nats, bit for bit as its ``entropy``; all of them are over the same objects."""
+    if not beliefs:
+        return []
+    n_unseen = np.array([belief.n_unseen for belief in beliefs])
+    probabilities = np.empty((len(beliefs), 1 + len(beliefs[0].objects)))
+    for row, belief in zip(probabilities, beliefs, strict=True):
+        row[:-1], row[-1] = belief.objects, belief.unseen
+    found = probabilities[:, -1] * np.log(n_unseen) - x_log_x(probabilities).sum(axis=1)
+    return [max(0.0, each) for each in found.tolist()]
+
+
 class BeliefTable:
     """p(O | z, a) by name, the most probable objects first; shows itself in a notebook.
 

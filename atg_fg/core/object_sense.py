@@ -224,6 +224,8 @@ def check_measured(senses: Sequence[ObjectSense], measured: Any, place: str = "m
     """
     if not isinstance(measured, Mapping):
         raise InvalidInputError(f"{place}: {brief(measured)}; expected readings by name")
+    if not measured:
+        return ()
     names = [each.name for each in senses]
     for name in measured:
         if name not in names:

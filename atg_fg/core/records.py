@@ -9,7 +9,7 @@ from typing import Any, Final, Literal, NamedTuple, TypeAlias, get_args
 import numpy as np
 
 from atg_fg.core.assumptions import Assumptions
-from atg_fg.core.belief import IdentityBelief
+from atg_fg.core.belief import IdentityBelief, entropies
 from atg_fg.core.checks import brief, sequence
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.looks import Look, confidences_in, confidences_of, evidence_of, pattern_to_learn, truth_of
@@ -283,12 +283,13 @@ class TrialSummary:
                 that a likelihood alone makes more probable than not.
         """
         names = record.assumptions.actions
+        entropies_of_looks = entropies([step.belief for step in record.steps])
         steps = [
             StepSummary(
                 step.detection,
                 step.pattern,
                 float(step.belief.unseen),
-                float(step.belief.entropy),
+                entropy,
                 step.truth,
                 None if step.action is None else names[step.action],
                 step.purpose,
@@ -297,7 +298,7 @@ class TrialSummary:
                 if step.expected_entropies is None
                 else dict(zip(names, step.expected_entropies.tolist(), strict=True)),
             )
-            for step in record.steps
+            for step, entropy in zip(record.steps, entropies_of_looks, strict=True)
         ]
         if learned_patterns is None:
             alphabet = record.assumptions.alphabet

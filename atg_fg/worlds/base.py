@@ -17,7 +17,8 @@ World: TypeAlias = gymnasium.Env[IntArray, np.int64]
 
 def detection_of(observation: IntArray) -> Detection:
     """Return an observation as a detection, with ``None`` for each missing symbol."""
-    return tuple(None if symbol == MISSING else int(symbol) for symbol in observation)
+    # Python's numbers are several times as quick to go through as NumPy's.
+    return tuple(None if symbol == MISSING else int(symbol) for symbol in np.asarray(observation).tolist())
 
 
 def looks_space(n_slots: int, n_symbols: int) -> spaces.Box:

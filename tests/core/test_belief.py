@@ -5,7 +5,7 @@ from math import log
 import numpy as np
 import pytest
 
-from atg_fg.core.belief import IdentityBelief
+from atg_fg.core.belief import IdentityBelief, entropies
 from atg_fg.core.errors import ImpossibleEvidenceError, InvalidInputError, UnknownNameError
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
@@ -155,6 +155,15 @@ def test_a_sure_belief_has_no_entropy() -> None:
     assert IdentityBelief(np.array([0.0, 1.0]), 0.0, n_unseen=98).entropy == 0
     assert IdentityBelief(np.array([]), 1.0, n_unseen=1).entropy == 0
     assert IdentityBelief(np.array([]), 1.0, n_unseen=100).entropy == close(log(100))
+
+
+@pytest.mark.parametrize("n_objects", [0, 1, 7, 300])
+def test_entropies_taken_at_once_are_those_taken_one_by_one_bit_for_bit(n_objects: int) -> None:
+    rng = np.random.default_rng(n_objects)
+    drawn = [rng.dirichlet(np.full(n_objects + 1, spread)) for spread in (0.01, 0.1, 1.0, 1.0, 10.0)]
+    beliefs = [IdentityBelief.of(each, n_unseen) for n_unseen, each in enumerate(drawn, start=1)]
+    assert entropies(beliefs) == [belief.entropy for belief in beliefs]
+    assert entropies([]) == []
 
 
 @pytest.mark.parametrize(("unseen", "novel"), [(0.5, False), (0.5000001, True), (0.4999999, False), (1.0, True)])

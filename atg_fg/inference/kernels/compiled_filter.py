@@ -97,8 +97,9 @@ class CompiledRows:
         self._tables = with_more_room(self._tables, self._room, self._n_aspects)
         self._arrays = tuple(self._tables)
         self._room += self._room
-        more = self._tables.pattern.shape[1] - self._aspects.shape[1]
-        self._aspects = np.pad(self._aspects, ((0, 0), (0, more)))
+        aspects = np.zeros(self._tables.pattern.shape)
+        aspects[:, : self._aspects.shape[1]] = self._aspects
+        self._aspects = aspects
 
     def act(self, action: AnyAction) -> None:
         """Predict the effect of an action."""
