@@ -29,7 +29,7 @@ MAX_KINDS: Final = 5
 #: right would else hide a kind that is not known yet.
 WRONG_LIMIT: Final = (1.5, 0.03)
 EVENT_LIMIT: Final = (1.5, 0.1)
-EXCESS_FACTOR: Final = 2.0
+EXCESS_FACTOR: Final = 3.0
 BEFOREHAND: Final = Rates()
 #: Nats by which such a trial is less probable than as one of a plain ATG, at least.
 REFUSED: Final = 10.0
