@@ -123,6 +123,31 @@ class Reference:
         return result
 
 
+@pytest.mark.parametrize("seed", range(40))
+def test_with_nothing_learned_it_is_the_bayes_filter(seed):
+    case = random_case(np.random.default_rng(seed))
+    engines = [
+        begin_trial("learned-structure", StructuredMemory(case.assumptions, case.memory), replace(p, learn_structure=x))
+        for p, x in ((case.parameters, True), (case.parameters, False))
+    ]
+    engines.append(begin_trial("bayes-filter", case.memory, case.parameters))
+    for time, look in enumerate(case.looks):
+        try:
+            for each in engines:
+                each.observe(look.evidence(case.assumptions.alphabet))
+        except ImpossibleEvidenceError:
+            return
+        beliefs = [each.identity() for each in engines]
+        for belief, each in zip(beliefs, engines, strict=True):
+            # Compiled loops, which only the last of them has, add up in another order.
+            np.testing.assert_allclose(belief.objects, beliefs[-1].objects, rtol=0, atol=1e-12)
+            assert each.log_evidence == pytest.approx(engines[-1].log_evidence, abs=1e-12)
+            np.testing.assert_allclose(each.expected_entropies(), engines[-1].expected_entropies(), rtol=0, atol=1e-12)
+        if time < len(case.actions):
+            for each in engines:
+                each.act(case.actions[time])
+
+
 @pytest.mark.parametrize(
     ("contents", "missing"),
     [
@@ -149,31 +174,6 @@ def test_it_is_close_to_the_exact_posterior_of_a_small_world(ring_memory, conten
             np.testing.assert_allclose(inference.expected_entropies(), reference.expected_entropies(), atol=0.02)
     print(f"worst error of p(O): {worst:.4f}")
     assert worst < 0.01
-
-
-@pytest.mark.parametrize("seed", range(40))
-def test_with_nothing_learned_it_is_the_bayes_filter(seed):
-    case = random_case(np.random.default_rng(seed))
-    engines = [
-        begin_trial("learned-structure", StructuredMemory(case.assumptions, case.memory), replace(p, learn_structure=x))
-        for p, x in ((case.parameters, True), (case.parameters, False))
-    ]
-    engines.append(begin_trial("bayes-filter", case.memory, case.parameters))
-    for time, look in enumerate(case.looks):
-        try:
-            for each in engines:
-                each.observe(look.evidence(case.assumptions.alphabet))
-        except ImpossibleEvidenceError:
-            return
-        beliefs = [each.identity() for each in engines]
-        for belief, each in zip(beliefs, engines, strict=True):
-            # Compiled loops, which only the last of them has, add up in another order.
-            np.testing.assert_allclose(belief.objects, beliefs[-1].objects, rtol=0, atol=1e-12)
-            assert each.log_evidence == pytest.approx(engines[-1].log_evidence, abs=1e-12)
-            np.testing.assert_allclose(each.expected_entropies(), engines[-1].expected_entropies(), rtol=0, atol=1e-12)
-        if time < len(case.actions):
-            for each in engines:
-                each.act(case.actions[time])
 
 
 @pytest.fixture(scope="module")

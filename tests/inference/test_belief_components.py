@@ -14,7 +14,12 @@ from tests.small import EXACT_ENGINES, each_of
 
 ASSUMPTIONS = arcube_assumptions()
 CUBES = make_arcubes(3, seed=0)
-PARTIAL = learned_memory(ASSUMPTIONS, CUBES, RandomPolicy(), 6, np.random.default_rng(0))
+
+
+@pytest.fixture(scope="module")
+def partial():
+    """A memory of the cubes of which not all is known."""
+    return learned_memory(ASSUMPTIONS, CUBES, RandomPolicy(), 6, np.random.default_rng(0))
 
 
 def looked(memory, parameters, *detections, engine="bayes-filter"):
@@ -34,8 +39,8 @@ def test_where_all_is_known_the_robot_is_at_the_aspect_it_sees():
     assert component.graph.number_of_edges() == 72
 
 
-def test_probabilities_are_those_of_the_belief_over_identity():
-    inference = looked(PARTIAL, ModelParameters(0.1, 0.1), (3, None))
+def test_probabilities_are_those_of_the_belief_over_identity(partial):
+    inference = looked(partial, ModelParameters(0.1, 0.1), (3, None))
     probabilities = inference.identity().probabilities
     for component in inference.belief_components():
         assert component.probability == pytest.approx(probabilities[component.hypothesis], abs=1e-12)
@@ -44,15 +49,15 @@ def test_probabilities_are_those_of_the_belief_over_identity():
 
 @pytest.mark.parametrize("learn", [True, False])
 @pytest.mark.parametrize("detections", [[(3, None)], [(3, 4)], [(3, 4), (None, None)]])
-def test_shown_patterns_are_a_distribution(learn, detections):
-    shown = looked(PARTIAL, ModelParameters(0.1, 0.2, learn), *detections).shown_patterns()
+def test_shown_patterns_are_a_distribution(partial, learn, detections):
+    shown = looked(partial, ModelParameters(0.1, 0.2, learn), *detections).shown_patterns()
     assert shown.min() >= 0
     assert shown.sum() == pytest.approx(1.0, abs=1e-9)
 
 
 @pytest.mark.parametrize("learn", [True, False])
-def test_a_complete_look_without_noise_is_what_is_shown(learn):
-    shown = looked(PARTIAL, ModelParameters(0.1, 0.0, learn), (3, 4)).shown_patterns()
+def test_a_complete_look_without_noise_is_what_is_shown(partial, learn):
+    shown = looked(partial, ModelParameters(0.1, 0.0, learn), (3, 4)).shown_patterns()
     assert shown[ASSUMPTIONS.alphabet.index((3, 4))] == pytest.approx(1.0, abs=1e-12)
 
 
@@ -64,15 +69,15 @@ def test_shown_patterns_of_an_unknown_object_by_hand():
 
 
 @each_of(name for name in EXACT_ENGINES if name != "enumeration")
-def test_exact_engines_agree(engine):
+def test_exact_engines_agree(partial, engine):
     parameters = ModelParameters(0.1, 0.2)
-    ours, theirs = (looked(PARTIAL, parameters, (3, 4), (4, None), engine=each) for each in (engine, "bayes-filter"))
+    ours, theirs = (looked(partial, parameters, (3, 4), (4, None), engine=each) for each in (engine, "bayes-filter"))
     assert np.abs(ours.shown_patterns() - theirs.shown_patterns()).max() < 1e-12
     for first, second in zip(ours.belief_components(), theirs.belief_components(), strict=True):
         assert first.probability == pytest.approx(second.probability, abs=1e-12)
         assert dict(first.belief) == pytest.approx(dict(second.belief), abs=1e-12)
 
 
-def test_asked_before_the_look_it_refuses():
+def test_asked_before_the_look_it_refuses(partial):
     with pytest.raises(InvalidInputError, match="asked before the look"):
-        begin_trial("bayes-filter", PARTIAL, ModelParameters()).shown_patterns()
+        begin_trial("bayes-filter", partial, ModelParameters()).shown_patterns()
