@@ -32,6 +32,10 @@ HOSTILE = (
     '<b>"50%" & | `more`',
     "\\x1b",
 )
+#: All of them in one name stand for each by itself.
+EACH_NAME = pytest.mark.parametrize(
+    "name", [" ".join(HOSTILE), *(pytest.param(name, marks=pytest.mark.slow) for name in HOSTILE)]
+)
 STEERING = re.compile("[\0-\x09\x0b-\x1f\x7f-\x9f\u2028-\u202e\u2066-\u2069]")
 
 
@@ -78,7 +82,7 @@ def shown(run, monkeypatch):
     return called
 
 
-@pytest.mark.parametrize("name", HOSTILE)
+@EACH_NAME
 def test_every_command_shows_a_name_of_an_object_as_it_is(shown, tmp_path, name):
     file, other = tmp_path / "memory.json", tmp_path / "other.json"
     file.write_text(renamed(plain(2), ("object-001", name)))
@@ -99,7 +103,7 @@ def test_every_command_shows_a_name_of_an_object_as_it_is(shown, tmp_path, name)
             ElementTree.fromstring(exported.read_bytes())
 
 
-@pytest.mark.parametrize("name", HOSTILE)
+@EACH_NAME
 def test_every_command_shows_names_in_a_script_as_they_are(shown, tmp_path, name):
     file = script(tmp_path, name)
     for words in (("replay", file, "--table"), ("explain", file, "--smooth", "--samples", "2")):

@@ -19,7 +19,7 @@ CHUNKS, CHUNK_SIZE = 20, 26
 #: Routes make the whole graph anew at each question, which takes long; they get fewer of the models.
 ROUTE_CHUNKS = 4
 #: The rest is slow.
-QUICK_CHUNKS, QUICK_ROUTE_CHUNKS = 2, 2
+QUICK_CHUNKS, QUICK_ROUTE_CHUNKS = 2, 1
 TOLERANCE = 1e-12
 
 

@@ -89,7 +89,7 @@ def test_few_values_an_edge_are_the_dense_tables(engine: str, case: Case) -> Non
 
 @pytest.mark.parametrize("engine", QUICK)
 @given(case=cases())
-@settings(max_examples=20)
+@settings(max_examples=min(8, settings.default.max_examples))
 def test_few_factors_are_the_graphs_of_all_actions_and_patterns_eliminated(engine: str, case: Case) -> None:
     inference = looked(engine, case)
     model = inference.model

@@ -201,13 +201,13 @@ def test_json_in_a_text_is_read(bag, topics, text):
 def test_what_is_not_there_is_one_line(bag, topics, text, change, message):
     path = bag([text("/seen", "logo"), text("/did", "turn"), text("/seen", "lid")])
     with pytest.raises(InvalidInputError, match=message):
-        read_bag(path, topics(**{"slots": {"label": LABEL}, "action": DID, **change}))
+        rosbag_recordings.read_bag(path, topics(**{"slots": {"label": LABEL}, "action": DID, **change}))
 
 
 def test_half_a_character_is_no_name(bag, topics, text):
     path = bag([text("/seen", json.dumps({"name": "\ud800"})), text("/did", "turn"), text("/seen", '{"name": "lid"}')])
     with pytest.raises(InvalidInputError, match=r"message 0 of /seen: .*expected a text of whole characters"):
-        read_bag(path, topics(slots={"label": {"topic": "/seen", "label": "data.name"}}, action=DID))
+        rosbag_recordings.read_bag(path, topics(slots={"label": {"topic": "/seen", "label": "data.name"}}, action=DID))
 
 
 def test_an_unknown_type_is_one_line(bag, topics, text):
@@ -215,7 +215,7 @@ def test_an_unknown_type_is_one_line(bag, topics, text):
     meta = path / "metadata.yaml"
     meta.write_text(meta.read_text().replace("std_msgs/msg/String", "my_msgs/msg/Label", 1))
     with pytest.raises(InvalidInputError, match="type 'my_msgs/msg/Label' is not known; expected a bag that holds its"):
-        read_bag(path, topics(slots={"label": LABEL}, action=DID))
+        rosbag_recordings.read_bag(path, topics(slots={"label": LABEL}, action=DID))
 
 
 @pytest.mark.parametrize(

@@ -16,10 +16,11 @@ from atg_fg.worlds.testing import check_world
 OURS = [name for name, place in WORLDS.items() if place.startswith("atg_fg")]
 
 
+@pytest.mark.parametrize("trials", [1, pytest.param(4, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("noise", [{}, {"slip": 0.1, "wrong": 0.1, "missing": 0.1}])
 @pytest.mark.parametrize("world", OURS)
-def test_the_worlds_there_are_keep_what_they_promise(world, noise):
-    assert check_world(world, **noise) == 4 * 21
+def test_the_worlds_there_are_keep_what_they_promise(world, noise, trials):
+    assert check_world(world, trials=trials, **noise) == trials * 21
 
 
 def test_wrappers_and_options_are_taken():
