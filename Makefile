@@ -194,10 +194,10 @@ results-structure: $(READY)  ## Run the experiments on learned structure (about 
 		$(BIN)/atg-fg table1 --world $$world --preset learned --tests 5 --json results/kinds_$$world.json || exit; \
 	done
 	for world in prism mixed half-and-half; do \
-		$(BIN)/atg-fg table1 --world $$world --preset learned --tests 20 --json results/kinds_$$world.json || exit; \
+		$(BIN)/atg-fg table1 --world $$world --preset learned --tests 40 --json results/kinds_$$world.json || exit; \
 	done
 	for world in prism mixed; do \
-		$(BIN)/atg-fg table1 --world $$world --preset learned --tests 20 --slip 0.02 --wrong 0.005 \
+		$(BIN)/atg-fg table1 --world $$world --preset learned --tests 40 --slip 0.02 --wrong 0.005 \
 			--json results/kinds_$${world}_noisy.json || exit; \
 	done
 	for world in half-and-half random-atg; do \
@@ -217,7 +217,7 @@ results-structure: $(READY)  ## Run the experiments on learned structure (about 
 
 # Evidence that errs: each world of the table in docs/experiments.md.
 DETECTOR := table1 --preset learned --world detector --objects 8 --trials 48 --actions 8 --tests 20
-NOISY := table1 --preset learned --tests 10
+NOISY := table1 --preset learned --tests 5
 results-evidence: $(READY)  ## Run the experiments on evidence that errs (about an hour on 2 cores)
 	mkdir -p results/evidence
 	for noise in 0,0 0.05,0.05 0.2,0.1; do for confidences in false true; do for own in false true; do \
