@@ -107,6 +107,8 @@ def test_a_trial_is_the_same_whatever_was_before_it(make):
     assert history(world, 4, [LEFT]) == first
 
 
+# Its quicker twins are of the world with several stations, which is this one on rails.
+@pytest.mark.slow
 def test_a_trial_is_the_same_in_another_process():
     with multiprocessing.get_context("spawn").Pool(1) as pool:
         there = pool.apply(_history_elsewhere, (3, [0]))
@@ -120,6 +122,7 @@ def _history_elsewhere(seed, actions):
     return prints
 
 
+@pytest.mark.slow
 def test_a_state_that_was_kept_replays_bit_for_bit(make):
     world = make(condition="worn")
     world.reset(seed=1)
