@@ -11,10 +11,9 @@ import numpy as np
 
 from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.assumptions import Assumptions
-from atg_fg.core.compact.columns import positions
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.patterns import FloatArray
-from atg_fg.inference.kernels.table_kernels import Tables, write_row
+from atg_fg.inference.kernels.table_kernels import Tables, spread_rows, write_row
 
 #: Room that each row has for the aspects and edges that a trial finds, before rows have to be moved.
 ROOM: Final = 12
@@ -177,17 +176,12 @@ def empty_tables(n_rows: int, n_edges: int, width: int, n_actions: int, types: T
 
 def with_more_room(tables: Tables, room: int, n_aspects: int) -> Tables:
     """Return the same tables with room for so many more aspects, of |G| at most, and edges in each row."""
-    n_edges = tables.begins[:, -1] - tables.begins[:, 0]
-    starts = np.cumsum(n_edges + room) - (n_edges + room)
     width = 1 + min(int(tables.n_known.max()) + room, n_aspects)
     n_rows, before = tables.pattern.shape
+    n_edges = int((tables.begins[:, -1] - tables.begins[:, 0]).sum()) + n_rows * room
     types = (tables.n_known.dtype.type, tables.pattern.dtype.type)
-    more = empty_tables(n_rows, int((n_edges + room).sum()), max(width, before), tables.begins.shape[1] - 1, types)
-    there, here = positions(starts, n_edges), positions(tables.begins[:, 0], n_edges)
-    for old, new in zip(tables[3:], more[3:], strict=True):
-        new[there] = old[here]
-    more.pattern[:, :before] = tables.pattern
-    more.begins[...] = tables.begins + (starts - tables.begins[:, 0])[:, None]
+    more = empty_tables(n_rows, n_edges, max(width, before), tables.begins.shape[1] - 1, types)
+    spread_rows(tuple(tables), tuple(more), room)
     return more._replace(n_known=tables.n_known)
 
 

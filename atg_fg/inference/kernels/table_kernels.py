@@ -89,6 +89,30 @@ def write_rows(
         aspect, row, first = last_aspect, last_row, first + n_counts[hypothesis] + room
 
 
+@compiled
+def spread_rows(tables: tuple[Any, ...], more: tuple[Any, ...], room: int) -> None:
+    """Write what hypotheses know into other tables, with room for so many more edges of each.
+
+    Args:
+        tables: ``Tables`` to read.
+        more: ``Tables`` to write, all but ``n_known``, of at least as many states.
+        room: Of each.
+    """
+    _, pattern, begins, edges, counted, probability = tables
+    _, to_pattern, to_begins, to_edges, to_counted, to_probability = more
+    n_actions, first = begins.shape[1] - 1, 0
+    for hypothesis in range(len(begins)):
+        for state in range(pattern.shape[1]):
+            to_pattern[hypothesis, state] = pattern[hypothesis, state]
+        shift = first - begins[hypothesis, 0]
+        for edge in range(begins[hypothesis, 0], begins[hypothesis, n_actions]):
+            to_edges[edge + shift, 0], to_edges[edge + shift, 1] = edges[edge, 0], edges[edge, 1]
+            to_counted[edge + shift], to_probability[edge + shift] = counted[edge], probability[edge]
+        for action in range(n_actions + 1):
+            to_begins[hypothesis, action] = begins[hypothesis, action] + shift
+        first = to_begins[hypothesis, n_actions] + room
+
+
 @compiled_within
 def weigh_all(tables: tuple[Any, ...], concentration: float) -> None:
     """Set the probabilities of the edges in all rows of all hypotheses, from their counts."""
