@@ -43,9 +43,7 @@ def calibrate(
     tag: BoardTag = 26.0,
     dictionary: BoardDictionary = "5X5_50",
     output: Annotated[
-        Path,
-        typer.Option("--output", "-o", writable=True, help="Calibration to write, JSON."),
-        plain_files.check_writable,
+        Path, options.written("--output", "-o", help="Calibration to write, JSON."), plain_files.check_writable
     ] = Path("camera.json"),
     json_file: options.JsonFile = None,
 ) -> None:

@@ -96,9 +96,7 @@ def demo(
     preset: options.Preset = "default",
     actions: options.Actions = 8,
     novel: Annotated[bool, typer.Option("--novel", help="Present an object the robot has never met.")] = False,
-    output: Annotated[
-        Path, typer.Option(writable=True, help="Folder for the pictures, the memory and the record.")
-    ] = Path("out"),
+    output: Annotated[Path, options.written(help="Folder for the pictures, the memory and the record.")] = Path("out"),
     condition: options.Condition = None,
     urdf: options.Urdf = None,
     seed: options.Seed = 0,
@@ -165,8 +163,7 @@ def watch(
     actions: options.Actions = 8,
     novel: Annotated[bool, typer.Option("--novel", help="Present an object the robot has never met.")] = False,
     save: Annotated[
-        Path | None,
-        typer.Option(writable=True, help="Save a recording (.rrd) instead of opening the viewer; needs no screen."),
+        Path | None, options.written(help="Save a recording (.rrd) instead of opening the viewer; needs no screen.")
     ] = None,
     condition: options.Condition = None,
     urdf: options.Urdf = None,

@@ -193,9 +193,7 @@ def figure3(
     json_file: options.JsonFile = None,
     log: options.Log = None,
     csv_file: Annotated[
-        Path | None,
-        typer.Option("--csv", writable=True, help="Write the points as CSV to this file."),
-        plain_files.check_writable,
+        Path | None, options.written("--csv", help="Write the points as CSV to this file."), plain_files.check_writable
     ] = None,
     plot: options.Plot = None,
 ) -> None:

@@ -62,9 +62,7 @@ def live(
     ] = None,
     memory: Annotated[
         Path | None,
-        typer.Option(
-            writable=True, help="Memory file (JSON or .db); made if it is not there. In mind only if not given."
-        ),
+        options.written(help="Memory file (JSON or .db); made if it is not there. In mind only if not given."),
     ] = None,
     learn: Annotated[
         bool, typer.Option("--learn", help="Learn from every trial, not from those asked for only.")
@@ -93,7 +91,7 @@ def live(
         ),
     ] = None,
     draw: Annotated[
-        Path | None, typer.Option(writable=True, help="Folder for a picture of each look with the tags drawn in.")
+        Path | None, options.written(help="Folder for a picture of each look with the tags drawn in.")
     ] = None,
     timeout: Annotated[float, typer.Option(help="Seconds that a frame may take.")] = 10.0,
     seed: options.Seed = 0,

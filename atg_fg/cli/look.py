@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
-import typer
 from rich.table import Table
 
 from atg_fg.cli import options
@@ -38,9 +37,7 @@ def look(
     tag_size: TagSize = 45.0,
     calibration: CalibrationFile = None,
     field_of_view: FieldOfView = USUAL_FIELD_OF_VIEW,
-    draw: Annotated[
-        Path | None, typer.Option(writable=True, help="Folder for the images with the tags drawn in.")
-    ] = None,
+    draw: Annotated[Path | None, options.written(help="Folder for the images with the tags drawn in.")] = None,
     json_file: options.JsonFile = None,
 ) -> None:
     """Look at photographs: which tags are in them, where, and how surely they were read.

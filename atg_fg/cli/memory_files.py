@@ -44,9 +44,7 @@ def export(
     completed: Annotated[
         bool, typer.Option("--completed", help="Add the aspects and transitions that the learned structure predicts.")
     ] = False,
-    output: Annotated[
-        Path | None, typer.Option(writable=True, help="File to write; standard output if not given.")
-    ] = None,
+    output: Annotated[Path | None, options.written(help="File to write; standard output if not given.")] = None,
 ) -> None:
     """Export one ATG as GraphML or DOT, the whole memory as JSON, or its trials, a line of JSON each.
 
@@ -98,9 +96,7 @@ def import_files(
     files: Annotated[
         list[Path], options.argument(help="Memories (JSON or databases), and logs of trials (.jsonl.gz).")
     ],
-    into: Annotated[
-        Path, typer.Option(writable=True, help="The database; made if it is not there.", show_default=False)
-    ],
+    into: Annotated[Path, options.written(help="The database; made if it is not there.", show_default=False)],
 ) -> None:
     """Put a memory, and records of trials, into a database: all of them, or nothing.
 
@@ -136,9 +132,7 @@ def merge(
     first: Annotated[Path, options.argument(help="A memory; its names stay.")],
     second: Annotated[Path, options.argument(help="Another memory.")],
     output: Annotated[
-        Path,
-        typer.Option("--output", "-o", writable=True, help="The new file.", show_default=False),
-        plain_files.check_writable,
+        Path, options.written("--output", "-o", help="The new file.", show_default=False), plain_files.check_writable
     ],
     json_file: options.JsonFile = None,
 ) -> None:
@@ -215,7 +209,7 @@ def _told(found: dict[str, Any]) -> list[str]:
 
 def compact(
     file: options.MemoryFile,
-    output: Annotated[Path, typer.Option(writable=True, help="File of arrays to write, .npz.", show_default=False)],
+    output: Annotated[Path, options.written(help="File of arrays to write, .npz.", show_default=False)],
     json_file: options.JsonFile = None,
 ) -> None:
     """Write the ATGs of a memory as arrays, which load a hundred times as fast; for the engine large-memory.

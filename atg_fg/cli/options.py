@@ -47,6 +47,8 @@ in_world, in_model, in_trials, in_running = (
 )
 #: An argument of a command; it has no default that a help page could show.
 argument = partial(typer.Argument, show_default=False)
+#: An option for what a command writes to: see ``atg_fg.cli.paths``.
+written = partial(typer.Option, writable=True)
 
 MemoryFile = Annotated[Path, argument(help="A memory: JSON, or a database.")]
 World = Annotated[str, in_world(help=f"World: {', '.join(WORLDS)}, or module:namespace/Id-v0 of your own.")]
@@ -90,13 +92,11 @@ Log = Annotated[
 ]
 JsonFile = Annotated[
     str | None,
-    typer.Option("--json", writable=True, help="Write the result as JSON to this file, or - to print it."),
+    written("--json", help="Write the result as JSON to this file, or - to print it."),
     plain_files.check_writable,
 ]
 Plot = Annotated[
-    Path | None,
-    typer.Option(writable=True, help="Draw the result into this .png, .svg or .pdf file."),
-    figures.check_figure_path,
+    Path | None, written(help="Draw the result into this .png, .svg or .pdf file."), figures.check_figure_path
 ]
 Slip = Annotated[float, in_world(help="Probability that an action fails and the object stays as it is.")]
 Wrong = Annotated[float, in_world(help="Probability that a look shows a pattern drawn at random.")]

@@ -1,8 +1,8 @@
 """No command writes over a file that it reads, writes twice to one, or works for what cannot be written in the end.
 
-An option or argument of type ``Path`` is read, unless ``typer.Option(writable=True)`` says that it is written to. What
-refuses a path that cannot be written, such as ``check_writable``, stands beside the option, as one more annotation of
-the parameter. So this is done once, for all commands, from how they are declared.
+An option or argument of type ``Path`` is read, unless ``writable=True`` says that it is written to, as
+``options.written`` does. What refuses a path that cannot be written, such as ``check_writable``, stands beside the
+option, as one more annotation of the parameter. So this is done once, for all commands, from how they are declared.
 """
 
 from __future__ import annotations

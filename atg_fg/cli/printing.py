@@ -33,8 +33,7 @@ def cube(
     tag_size: Annotated[float | None, typer.Option(help="Side of a tag, mm; three quarters of the cube's.")] = None,
     paper: Paper = "a4",
     output: Annotated[
-        Path,
-        typer.Option("--output", "-o", writable=True, help="PDF to cut and glue, or .3mf or .stl for a 3D printer."),
+        Path, options.written("--output", "-o", help="PDF to cut and glue, or .3mf or .stl for a 3D printer.")
     ] = Path("cube.pdf"),
     seed: Annotated[int, typer.Option(min=0, help="Seed of the draws among which the cubes are chosen.")] = 0,
     json_file: options.JsonFile = None,
@@ -81,7 +80,7 @@ def board(
     tag: BoardTag = 26.0,
     dictionary: BoardDictionary = "5X5_50",
     paper: Paper = "a4",
-    output: Annotated[Path, typer.Option("--output", "-o", writable=True, help="PDF to write.")] = Path("board.pdf"),
+    output: Annotated[Path, options.written("--output", "-o", help="PDF to write.")] = Path("board.pdf"),
 ) -> None:
     """Print a board to calibrate a camera with.
 

@@ -20,7 +20,7 @@ from atg_fg.storage.rosbag_recordings import is_bag, read_topics
 
 Output = Annotated[
     Path,
-    typer.Option("--output", "-o", writable=True, help=".jsonl or .csv to write.", show_default=False),
+    options.written("--output", "-o", help=".jsonl or .csv to write.", show_default=False),
     plain_files.check_writable,
 ]
 app = typer.Typer(

@@ -42,7 +42,7 @@ Exclusive = Annotated[
     bool | None, typer.Option("--exclusive/--no-exclusive", help="Whether a label is in one slot only, as a tag is.")
 ]
 MemoryPath = Annotated[
-    Path, typer.Option(help="The memory; a new one is begun if there is none.", writable=True, show_default=False)
+    Path, options.written(help="The memory; a new one is begun if there is none.", show_default=False)
 ]
 
 
@@ -102,7 +102,7 @@ def recognise(
     spec: Spec = None,
     preset: options.Preset = "learned",
     engine: options.PresetsEngine = None,
-    report: Annotated[Path | None, typer.Option(writable=True, help="HTML page of the trials to write.")] = None,
+    report: Annotated[Path | None, options.written(help="HTML page of the trials to write.")] = None,
     json_file: options.JsonFile = None,
 ) -> None:
     """Recognise the object of each trial in recordings, with the posterior after every look.

@@ -31,9 +31,8 @@ def structure(
     name: Annotated[str | None, typer.Option("--object", help="Show what is predicted of this object.")] = None,
     plot: Annotated[
         Path | None,
-        typer.Option(
-            writable=True,
-            help="Draw the structure, or the completed ATG of --object, into this .png, .svg or .pdf file.",
+        options.written(
+            help="Draw the structure, or the completed ATG of --object, into this .png, .svg or .pdf file."
         ),
         figures.check_figure_path,
     ] = None,

@@ -50,12 +50,12 @@ def trial(
     ] = None,
     save_memory: Annotated[
         Path | None,
-        typer.Option(writable=True, help="Save the memory with what was learned to this file."),
+        options.written(help="Save the memory with what was learned to this file."),
         plain_files.check_writable,
     ] = None,
     record: Annotated[
         Path | None,
-        typer.Option(writable=True, help="Write the trial's record as JSON lines to this file."),
+        options.written(help="Write the trial's record as JSON lines to this file."),
         plain_files.check_writable,
     ] = None,
     frames: Annotated[

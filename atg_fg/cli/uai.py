@@ -90,13 +90,9 @@ TASKS: dict[str, Callable[[DiscreteModel, dict[int, int], int], _Answer]] = {
 def export(
     script: Annotated[Path, options.argument(help="A scripted trial (JSON).")],
     model: Annotated[
-        Path,
-        typer.Option(writable=True, help="Write the trial's factor graph to this file."),
-        plain_files.check_writable,
+        Path, options.written(help="Write the trial's factor graph to this file."), plain_files.check_writable
     ],
-    evidence: Annotated[
-        Path, typer.Option(writable=True, help="Write what was seen to this file."), plain_files.check_writable
-    ],
+    evidence: Annotated[Path, options.written(help="Write what was seen to this file."), plain_files.check_writable],
 ) -> None:
     """Write the factor graph of a scripted trial and its evidence in the UAI format.
 
