@@ -117,12 +117,28 @@ def table1(
     summary = summarise(results)
     if settled is not None:
         summary["actions_a_trial"] = actions_a_trial(results)
-    parameters: dict[str, Any] = {"world": world, "engine": engine, "preset": preset, "policy": policy, "tests": tests}
-    parameters |= {"actions": actions, "trials": trials}
-    parameters |= {} if objects == TestPlan.n_objects else {"objects": objects}
-    parameters |= {"seed": seed, "slip": slip, "wrong": wrong, "missing": missing, **world_options}
-    learning = {"smoothed_learning": smoothed_learning or None, "settled": settled}
-    parameters |= without_none({**learning, "merge_duplicates": merge_duplicates or None})
+    parameters = {
+        "world": world,
+        "engine": engine,
+        "preset": preset,
+        "policy": policy,
+        "tests": tests,
+        "actions": actions,
+        "trials": trials,
+        **({} if objects == TestPlan.n_objects else {"objects": objects}),
+        "seed": seed,
+        "slip": slip,
+        "wrong": wrong,
+        "missing": missing,
+        **world_options,
+        **without_none(
+            {
+                "smoothed_learning": smoothed_learning or None,
+                "settled": settled,
+                "merge_duplicates": merge_duplicates or None,
+            }
+        ),
+    }
     if options.write_json({"command": "table1", "parameters": parameters, **summary}, json_file):
         number = f"{actions} actions" if settled is None else f"up to {actions} actions"
         title = f"Table 1: {world} world, preset {preset}, {policy} policy, {number} a trial, engine {engine}"
@@ -215,8 +231,18 @@ def figure3(
     seeds = range(seed, seed + tests)
     with options.progress_bar("trials", len(numbers) * len(FIGURE3_POLICIES) * tests * trials) as advance:
         points = figure3_points(plan, numbers, FIGURE3_POLICIES, seeds, workers, advance, kept, executor)
-    parameters: dict[str, Any] = {"world": world, "engine": engine, "preset": preset, "actions": numbers}
-    parameters |= {"tests": tests, "trials": trials, "seed": seed, "slip": slip, "wrong": wrong, "missing": missing}
+    parameters = {
+        "world": world,
+        "engine": engine,
+        "preset": preset,
+        "actions": numbers,
+        "tests": tests,
+        "trials": trials,
+        "seed": seed,
+        "slip": slip,
+        "wrong": wrong,
+        "missing": missing,
+    }
     document = {"command": "figure3", "parameters": parameters, "points": points}
     options.write_json(document, json_file)
     if csv_file is not None:

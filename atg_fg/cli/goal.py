@@ -101,11 +101,23 @@ def goal(
     with options.progress_bar("runs", trials) as advance:
         runs = run_many(plan, seed, trials, workers, records, resume, executor, advance)
     summary = summarise(runs)
-    parameters: dict[str, Any] = {"world": world, "engine": engine, "preset": preset, "cubes": cubes}
-    parameters |= {"memory_cubes": memory_cubes, "learning_actions": learning_actions}
-    parameters |= {"learning_policy": learning_policy, "learning_world": learning_world}
-    parameters |= {"planner": planner, "unreachable": unreachable, "settled": settled}
-    parameters |= {"trials": trials, "actions": actions, "seed": seed, **world_options}
+    parameters = {
+        "world": world,
+        "engine": engine,
+        "preset": preset,
+        "cubes": cubes,
+        "memory_cubes": memory_cubes,
+        "learning_actions": learning_actions,
+        "learning_policy": learning_policy,
+        "learning_world": learning_world,
+        "planner": planner,
+        "unreachable": unreachable,
+        "settled": settled,
+        "trials": trials,
+        "actions": actions,
+        "seed": seed,
+        **world_options,
+    }
     document = {"command": "goal", "parameters": parameters, **summary}
     if options.write_json(document, json_file):
         title = f"{trials} runs, {cubes} of {memory_cubes} cubes, {world} world, preset {preset}, engine {engine}"
