@@ -127,8 +127,15 @@ class ObjectSense:
         least = _LEAST_SPREAD if relative else 1e-3 * max(abs(typical), 1e-3)
         spread = min(max(between, _DIFFERENT * within, least), GREATEST_READING)
         error = min(max(within, spread / _SURELY), spread / _DIFFERENT) if within else spread / _DIFFERENT
-        value, revealing = math.exp(typical) if relative else typical, tuple(revealed_by)
-        return cls(name, value, spread, error, relative=relative, worth=_GUESSED, revealed_by=revealing)
+        return cls(
+            name,
+            math.exp(typical) if relative else typical,
+            spread,
+            error,
+            relative=relative,
+            worth=_GUESSED,
+            revealed_by=tuple(revealed_by),
+        )
 
     def check(self, value: Any, place: str) -> float:
         """Return a reading as a float, or raise ``InvalidInputError`` naming ``place`` and the unit."""

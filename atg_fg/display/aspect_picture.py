@@ -74,9 +74,15 @@ def draw_arrow(axes: Axes, start: FloatArray, end: FloatArray, bend: float, shri
 
     points = 72 * INCHES_PER_UNIT
     patch = FancyArrowPatch(
-        tuple(start), tuple(end), connectionstyle=f"arc3,rad={bend}", arrowstyle="-|>,head_length=5,head_width=2.5",
-        shrinkA=0.66 * points, shrinkB=shrink * points, zorder=1, **style,
-    )  # fmt: skip
+        tuple(start),
+        tuple(end),
+        connectionstyle=f"arc3,rad={bend}",
+        arrowstyle="-|>,head_length=5,head_width=2.5",
+        shrinkA=0.66 * points,
+        shrinkB=shrink * points,
+        zorder=1,
+        **style,
+    )
     axes.add_patch(patch)
 
 

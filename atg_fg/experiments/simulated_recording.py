@@ -57,8 +57,16 @@ def simulated_recording(
             _trial(str(number), world, labels, assumptions.actions, n_actions, np.random.default_rng(trial_seed))
             for number, trial_seed in enumerate(trial_seeds)
         ]
-    sizes = assumptions.n_objects, assumptions.n_aspects
-    return Recording(alphabet.slots, assumptions.actions, labels, tuple(trials), *sizes, alphabet.exclusive, name)
+    return Recording(
+        alphabet.slots,
+        assumptions.actions,
+        labels,
+        tuple(trials),
+        assumptions.n_objects,
+        assumptions.n_aspects,
+        alphabet.exclusive,
+        name,
+    )
 
 
 def _trial(

@@ -47,11 +47,13 @@ def check_world_fits(world: World, assumptions: Assumptions, sense: Sense | None
             f"{n_slots} slots with numbers from -1, missing, to {n_symbols - 1}"
         )
     stated = assumptions_of(world, assumptions.n_objects) if world.has_wrapper_attr("assumptions") else assumptions
-    senses = [[f"{each.name} {each.unit}".rstrip() for each in of.object_senses] for of in (assumptions, stated)]
     for place, ours, theirs in (
         ("actions", assumptions.actions, stated.actions),
         ("slots", assumptions.alphabet.slots, stated.alphabet.slots),
-        ("senses of the object", *senses),
+        (
+            "senses of the object",
+            *([f"{each.name} {each.unit}".rstrip() for each in of.object_senses] for of in (assumptions, stated)),
+        ),
     ):
         if ours != theirs:
             raise InvalidInputError(f"world: {place} {', '.join(theirs)}; expected those remembered: {', '.join(ours)}")

@@ -57,13 +57,18 @@ def pose_chain(
     n_objects, n_poses = len(contents), len(poses.registers)
     shown = pose_patterns(poses, contents, rates, alphabet)
     turns = [_transition(poses, action, rates.slip) for action in range(poses.successors.shape[1])]
-    transitions = (mixed(action, turns.__getitem__, np.eye(n_poses)) for action in history.actions)
-    looks, wrong = [evidence.likelihood for evidence in history.evidence], rates.wrong / len(alphabet)
     return Chain(
         prior,
         np.full((n_objects, n_poses), 1.0 / n_poses),
-        tuple(np.broadcast_to(table, (n_objects, n_poses, n_poses)) for table in transitions),
-        tuple((1.0 - rates.wrong) * (shown @ likelihood) + wrong * likelihood.sum() for likelihood in looks),
+        tuple(
+            np.broadcast_to(mixed(action, turns.__getitem__, np.eye(n_poses)), (n_objects, n_poses, n_poses))
+            for action in history.actions
+        ),
+        tuple(
+            (1.0 - rates.wrong) * (shown @ evidence.likelihood)
+            + rates.wrong / len(alphabet) * evidence.likelihood.sum()
+            for evidence in history.evidence
+        ),
     )
 
 

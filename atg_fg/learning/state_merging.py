@@ -89,7 +89,7 @@ def merge_states(trials: Sequence[RawTrial], automata: Sequence[NextModes]) -> l
     """
     from atg_fg.learning import merging_kernels  # they load Numba
 
-    whole = [trial for trial in trials if all(map(_is_whole, trial.detections))]
+    whole = [trial for trial in trials if all(_is_whole(look) for look in trial.detections)]
     if not whole:
         return [None] * len(automata)
     symbols, actions = side_by_side(whole)

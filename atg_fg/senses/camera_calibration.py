@@ -157,5 +157,10 @@ def calibrate(images: Iterable[tuple[str, NDArray[np.uint8]]], board: Calibratio
     error, intrinsics, distortion, _, _ = cv2.calibrateCamera(
         [on_board for on_board, _ in found], [in_image for _, in_image in found], size, start, np.zeros(5)
     )
-    lens = np.asarray(intrinsics, dtype=np.float64), np.ravel(distortion).astype(np.float64)
-    return Calibration(*lens, size, float(error), len(found))
+    return Calibration(
+        np.asarray(intrinsics, dtype=np.float64),
+        np.ravel(distortion).astype(np.float64),
+        size,
+        float(error),
+        len(found),
+    )

@@ -89,8 +89,14 @@ class CubeTags:
     def seen_by(self, calibration: Calibration) -> Tags:
         """Return what a detector is to look for through a camera."""
         symbols = {tag_id: symbol for symbol, tag_id in enumerate(self.ids)}
-        lens = np.asarray(calibration.intrinsics), np.asarray(calibration.distortion)
-        return Tags(self.dictionary, self.size, *lens, symbols, calibration.image_size)
+        return Tags(
+            self.dictionary,
+            self.size,
+            np.asarray(calibration.intrinsics),
+            np.asarray(calibration.distortion),
+            symbols,
+            calibration.image_size,
+        )
 
 
 def write_tags(tags: CubeTags) -> dict[str, Any]:

@@ -123,9 +123,14 @@ def read_assumptions(value: Any, place: str) -> Assumptions:
     numbers = {
         key: whole_number(fields[key], f"{place}.{key}", least=1) for key in ("n_objects", "n_aspects", "n_symbols")
     }
-    exclusive, is_open = fields.get("exclusive", True), fields.get("open", False)
     with placed(place):
-        alphabet = PatternAlphabet(texts["slots"], numbers["n_symbols"], exclusive, texts["symbols"], is_open)
+        alphabet = PatternAlphabet(
+            texts["slots"],
+            numbers["n_symbols"],
+            fields.get("exclusive", True),
+            texts["symbols"],
+            fields.get("open", False),
+        )
         return Assumptions(numbers["n_objects"], numbers["n_aspects"], texts["actions"], alphabet, senses)
 
 

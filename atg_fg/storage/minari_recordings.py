@@ -92,8 +92,7 @@ def read_minari(name: str) -> Recording:
     minari = _minari()
     try:
         dataset = minari.load_dataset(_checked(name))
-        if dataset.total_steps > MAX_STEPS:
-            raise InvalidInputError(f"{name}: {dataset.total_steps} steps; expected at most {MAX_STEPS}")
+        _check_size(int(dataset.total_steps), name)
         metadata, episodes = dataset.storage.metadata, list(dataset.iterate_episodes())
         about = list(dataset.storage.get_episode_metadata([episode.id for episode in episodes]))
     except FileNotFoundError as error:
@@ -106,6 +105,11 @@ def read_minari(name: str) -> Recording:
         for episode, data in zip(episodes, about, strict=True)
     )
     return recording_of(header, f"{name}: {_NAMES}", trials, name, RecordingSpec())
+
+
+def _check_size(n_steps: int, name: str) -> None:
+    if n_steps > MAX_STEPS:
+        raise InvalidInputError(f"{name}: {n_steps} steps; expected at most {MAX_STEPS}")
 
 
 def _names(text: Any, place: str) -> dict[str, Any]:

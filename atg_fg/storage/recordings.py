@@ -158,8 +158,15 @@ def completed(recording: Recording, spec: RecordingSpec) -> Recording:
         for name in found:
             if known is not None and name not in known:
                 raise InvalidInputError(f"{recording.place}: {kind} {brief(name)}; expected one of: {listed(known)}")
-    sizes = recording.n_objects, recording.n_aspects, recording.exclusive or None
-    own = RecordingSpec(recording.slots, recording.actions, recording.labels, *sizes, recording.senses)
+    own = RecordingSpec(
+        recording.slots,
+        recording.actions,
+        recording.labels,
+        recording.n_objects,
+        recording.n_aspects,
+        recording.exclusive or None,
+        recording.senses,
+    )
     return _made(recording.trials, merged_spec(spec, own), recording.labels, recording.place)
 
 
@@ -198,10 +205,17 @@ def _with_found(senses: Sequence[ObjectSense | str], found: Iterable[str]) -> tu
 def _made(trials: Sequence[RecordedTrial], spec: RecordingSpec, labels: Sequence[str], place: str) -> Recording:
     """Return trials with what the spec says, and else with what occurs in them."""
     actions = spec.actions or tuple(sorted({action for trial in trials for action in trial.actions if action}))
-    known = spec.labels or tuple(sorted({*labels, *used_labels(trials)})) or ("nothing",)
-    senses = _with_found(spec.senses or (), senses_of(trials))
-    sizes = spec.n_objects, spec.n_aspects, bool(spec.exclusive)
-    return Recording(spec.slots or (), actions or ("wait",), known, tuple(trials), *sizes, place, senses)
+    return Recording(
+        spec.slots or (),
+        actions or ("wait",),
+        spec.labels or tuple(sorted({*labels, *used_labels(trials)})) or ("nothing",),
+        tuple(trials),
+        spec.n_objects,
+        spec.n_aspects,
+        bool(spec.exclusive),
+        place,
+        _with_found(spec.senses or (), senses_of(trials)),
+    )
 
 
 def _of_lines(text: str, place: str, spec: RecordingSpec) -> Recording:

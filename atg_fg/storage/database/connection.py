@@ -79,8 +79,12 @@ WAIT: Final = 5.0
 _MAGIC: Final = b"SQLite format 3\0"
 
 _WRITING_FAILED: Final = (
-    sqlite3.SQLITE_FULL, sqlite3.SQLITE_READONLY, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_PERM, sqlite3.SQLITE_TOOBIG,
-)  # fmt: skip
+    sqlite3.SQLITE_FULL,
+    sqlite3.SQLITE_READONLY,
+    sqlite3.SQLITE_IOERR,
+    sqlite3.SQLITE_PERM,
+    sqlite3.SQLITE_TOOBIG,
+)
 
 
 class EmptyDatabaseError(InvalidInputError):
