@@ -114,6 +114,14 @@ def copy_into(target: NDArray[Any], source: NDArray[Any]) -> None:
             target[row, column] = source[row, column]
 
 
+@compiled_within
+def add_share(share: float, table: FloatArray, total: FloatArray) -> None:
+    """Add a share of a table to another, shape [P, S] both."""
+    for register in range(table.shape[0]):
+        for symbol in range(table.shape[1]):
+            total[register, symbol] += share * table[register, symbol]
+
+
 @compiled
 def walk(successors: IntArray, actions: IntArray, length: int, start: int, path: IntArray) -> None:
     """Fill in the states that actions lead through."""

@@ -6,7 +6,7 @@ import numpy as np
 
 from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.inference.kernels.compilation import compiled, compiled_within
-from atg_fg.learning.kernels import copy_into
+from atg_fg.learning.kernels import add_share, copy_into
 from atg_fg.learning.register_contents import SAME, TINY
 
 #: Rows less probable than this are dropped.
@@ -236,7 +236,7 @@ def merged(
             member = order[place]
             if key[member] != key[last[new]]:
                 break
-            add(weight[member] / max(weights[new], _LEAST), everything[table[member]], left[n_left])
+            add_share(weight[member] / max(weights[new], _LEAST), everything[table[member]], left[n_left])
         show(left[n_left], repeat, shown_left[n_left])
         numbers[new] = n_left
         n_left += 1
@@ -260,14 +260,6 @@ def in_order(numbers: IntArray, n_numbers: int, order: IntArray) -> IntArray:
         result[places[numbers[row]]] = row
         places[numbers[row]] += 1
     return result
-
-
-@compiled_within
-def add(share: float, contents: FloatArray, total: FloatArray) -> None:
-    """Add a share of a table to another."""
-    for register in range(contents.shape[0]):
-        for symbol in range(contents.shape[1]):
-            total[register, symbol] += share * contents[register, symbol]
 
 
 @compiled_within
@@ -371,22 +363,34 @@ def patterns_after(
     """
     owner, _, pose, weight, table, _ = rows
     successors, registers, possible = structure
-    n_actions = successors.shape[1]
-    total, counts = np.zeros(len(importance)), weight * importance[owner] > 1.0
-    for row in np.flatnonzero(counts):
-        total[owner[row]] += weight[row]
-    owners, number = np.flatnonzero(total), np.cumsum(total > 0) - 1
+    n_actions, (n_patterns, n_slots) = successors.shape[1], symbols.shape
+    # Loops: expressions of whole arrays take longer to compile than all of this.
+    total, n_owners = np.zeros(len(importance)), 0
+    for row in range(len(owner)):
+        if weight[row] * importance[owner[row]] > 1.0:
+            total[owner[row]] += weight[row]
+    owners, number = np.empty(len(total), np.int64), np.empty(len(total), np.int64)
+    for each in range(len(total)):
+        if total[each] > 0:
+            owners[n_owners], number[each] = each, n_owners
+            n_owners += 1
     # That nothing happens is one more thing that an action may do.
-    result = np.zeros((n_actions + 1, len(owners), len(symbols)))
-    for row in np.flatnonzero(counts):
-        of, share = shown[table[row]], weight[row] / total[owner[row]]
+    result = np.zeros((n_actions + 1, n_owners, n_patterns))
+    for row in range(len(owner)):
+        if not weight[row] * importance[owner[row]] > 1.0:
+            continue
+        of, own, share = shown[table[row]], number[owner[row]], weight[row] / total[owner[row]]
         for action in range(n_actions + 1):
             after = successors[pose[row], action] if action < n_actions else pose[row]
             in_view, happens = registers[after], 1.0 - slip if action < n_actions else slip
             factor = share * happens * possible[after] / max(different(of, in_view), TINY)
-            for pattern in range(len(symbols)):
+            for pattern in range(n_patterns):
                 probability = factor
-                for slot in range(symbols.shape[1]):
+                for slot in range(n_slots):
                     probability *= of[in_view[slot], symbols[pattern, slot]]
-                result[action, number[owner[row]], pattern] += probability
-    return owners, result[:n_actions] + result[n_actions]
+                result[action, own, pattern] += probability
+    for action in range(n_actions):
+        for own in range(n_owners):
+            for pattern in range(n_patterns):
+                result[action, own, pattern] += result[n_actions, own, pattern]
+    return owners[:n_owners], result[:n_actions]
