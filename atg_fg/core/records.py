@@ -307,8 +307,15 @@ class TrialSummary:
         patterns: tuple[int | None, ...] | None = tuple(learned_patterns)
         if patterns == tuple(record.patterns):
             patterns = None
-        verdict, mistakes = (record.verdict, record.matched), tuple(record.mistakes)
-        return cls(*verdict, tuple(steps), record.lost_truth, learned, patterns, mistakes=mistakes)
+        return cls(
+            record.verdict,
+            record.matched,
+            tuple(steps),
+            record.lost_truth,
+            learned,
+            patterns,
+            mistakes=tuple(record.mistakes),
+        )
 
     @property
     def patterns(self) -> tuple[int | None, ...]:

@@ -204,7 +204,9 @@ def _number(value: float | None) -> str:
 TABLES: Final[Mapping[str, Callable[[Mapping[str, Any]], list[Table]]]] = {
     "table1": _table1,
     "figure3": lambda document: [_curves("Success rate by number of actions", document["points"], "policy")],
-    "ablation": lambda document: [_curves(*place, "variant") for place in places_of(document["cells"]).items()],
+    "ablation": lambda document: [
+        _curves(place, cells, "variant") for place, cells in places_of(document["cells"]).items()
+    ],
     "goal": _goal,
     "compare": _compare,
     "rescore": _rescore,

@@ -25,12 +25,12 @@ PLAIN_BEFORE: Final = (1.0, 0.05)
 #: Structures that one memory may have kinds of.
 MAX_KINDS: Final = 5
 #: A trial that takes more wrong looks than this for one of a kind, or slips and wrong looks, is none of it: a, b of
-#: a + b · looks, and so many times as many more as the rates in force foretell beyond those beforehand. What is nearly
-#: right would else hide a kind that is not known yet.
+#: a + b · looks. What is nearly right would else hide a kind that is not known yet.
 WRONG_LIMIT: Final = (1.5, 0.03)
 EVENT_LIMIT: Final = (1.5, 0.1)
+#: These limits are for rates as they are beforehand: so many times what those in force foretell beyond them is added.
 EXCESS_FACTOR: Final = 3.0
-BEFOREHAND: Final = Rates()
+PRIOR_RATES: Final = Rates()
 #: Nats by which such a trial is less probable than as one of a plain ATG, at least.
 REFUSED: Final = 10.0
 #: A kind that takes more of its members' looks for errors than a + b · looks is nearly right at best. It is none,
@@ -86,8 +86,8 @@ def kind_table(
         given: What the evidence is given: ``NEW``, ``FILED`` or ``BEFORE``.
     """
     n_looks = np.array([len(trial.detections) for trial in trials])
-    excess_wrong = max(rates.wrong - BEFOREHAND.wrong, 0.0) * n_looks
-    excess_events = excess_wrong + max(rates.slip - BEFOREHAND.slip, 0.0) * (n_looks - 1)
+    excess_wrong = max(rates.wrong - PRIOR_RATES.wrong, 0.0) * n_looks
+    excess_events = excess_wrong + max(rates.slip - PRIOR_RATES.slip, 0.0) * (n_looks - 1)
     most_wrong = WRONG_LIMIT[0] + WRONG_LIMIT[1] * n_looks + EXCESS_FACTOR * excess_wrong
     most_events = EVENT_LIMIT[0] + EVENT_LIMIT[1] * n_looks + EXCESS_FACTOR * excess_events
     columns, most = [plain], plain.max(axis=1)

@@ -143,7 +143,7 @@ EXPERIMENTS: Final[Mapping[str, tuple[str, _Plots]]] = {
     ),
     "ablation": (
         "What each part of the model adds",
-        lambda document: [_curves(*place, "variant") for place in places_of(document["cells"]).items()],
+        lambda document: [_curves(place, cells, "variant") for place, cells in places_of(document["cells"]).items()],
     ),
     "goal": ("Reaching a goal", lambda document: [_rates(*goal_rates(document))]),
     "compare": ("Engines compared", _compare),

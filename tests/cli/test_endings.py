@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from tests.dask_cluster import ROOT, wait_for
+from tests.process_groups import descendants, nobody_left
 
 linux = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 COMMANDS = {
@@ -34,14 +35,6 @@ def begin(*arguments, **options):
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
         **options,
     )  # fmt: skip
-
-
-def nobody_left(group):
-    try:
-        os.killpg(group, 0)
-    except ProcessLookupError:
-        return True
-    return False
 
 
 def interrupted(process):
@@ -111,15 +104,6 @@ def test_ctrl_c_ends_a_command_while_it_loads_libraries(loaded, folder):
     process = begin("table1", "--tests", "1", "--jobs", "1", cwd=folder, stdout=subprocess.DEVNULL)
     wait_for(lambda: loaded in Path(f"/proc/{process.pid}/maps").read_text())
     assert interrupted(process) == (130, "")
-
-
-def descendants(process):
-    """The processes that a process has begun, and those that these have; none of one that has ended."""
-    try:
-        children = Path(f"/proc/{process}/task/{process}/children").read_text().split()
-    except OSError:
-        return []
-    return [*children, *(each for child in children for each in descendants(child))]
 
 
 @linux

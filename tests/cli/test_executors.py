@@ -5,13 +5,13 @@ import signal
 import subprocess
 import sys
 from functools import cache
-from pathlib import Path
 
 import pytest
 
 from atg_fg import cli
 from atg_fg.storage.trial_log import read_log
 from tests.dask_cluster import ROOT, wait_for
+from tests.process_groups import children_of, nobody_left
 
 slow = pytest.mark.slow
 #: Two tests that are soon over.
@@ -43,21 +43,9 @@ def finish(process):
     return process.returncode, output, error
 
 
-def nobody_left(group):
-    try:
-        os.killpg(group, 0)
-    except ProcessLookupError:
-        return True
-    return False
-
-
 def workers_of(process):
     """Return the ids of the workers of a process: what its children, one of which forks, have for children (Linux)."""
     return [worker for child in children_of(process.pid) for worker in children_of(child)]
-
-
-def children_of(process):
-    return list(map(int, Path(f"/proc/{process}/task/{process}/children").read_text().split()))
 
 
 def some_trials(folder):

@@ -12,6 +12,7 @@ from atg_fg.experiments.executors import fork_server
 from atg_fg.experiments.executors.base import run_pieces
 from atg_fg.experiments.executors.processes import WorkerProcesses
 from tests import dask_cluster, pieces
+from tests.process_groups import interruptions_noted, nobody_left
 
 pytestmark = pytest.mark.skipif(not fork_server.is_possible(), reason="no server is possible")
 
@@ -106,13 +107,8 @@ class TestCtrlCWhileItLoads:
         assert capfd.readouterr() == ("", "")
 
     def test_who_goes_on_after_it_gets_workers_all_the_same(self):
-        met = []
-        handler = signal.signal(signal.SIGINT, lambda *_: met.append(1))
-        try:
-            with closing(WorkerProcesses(1)) as workers:
-                assert workers.result(workers.submit(pieces.square, 3)) == 9
-        finally:
-            signal.signal(signal.SIGINT, handler)
+        with interruptions_noted() as met, closing(WorkerProcesses(1)) as workers:
+            assert workers.result(workers.submit(pieces.square, 3)) == 9
         assert met
 
 
@@ -141,11 +137,3 @@ def test_a_script_has_functions_of_its_own_and_leaves_no_process(campaign, tmp_p
     assert (process.returncode, error) == (0, "")
     assert output == ("[1, 2, 3]\n" if "own" in campaign else "ends before there is one\n")
     dask_cluster.wait_for(lambda: nobody_left(process.pid))
-
-
-def nobody_left(group):
-    try:
-        os.killpg(group, 0)
-    except ProcessLookupError:
-        return True
-    return False

@@ -13,6 +13,7 @@ from atg_fg.experiments.executors import fork_server
 from atg_fg.experiments.executors.processes import WorkerProcesses
 from tests import pieces
 from tests.dask_cluster import wait_for
+from tests.process_groups import interruptions_noted
 
 pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 
@@ -76,12 +77,7 @@ def test_an_interruption_waits_until_a_worker_has_been_told_what_to_do(interrupt
 
 @pytest.mark.usefixtures("interrupted_spawning")
 def test_the_worker_is_as_good_as_others_to_who_goes_on_after_an_interruption(capfd):
-    met = []
-    handler = signal.signal(signal.SIGINT, lambda *_: met.append(1))
-    try:
-        with closing(WorkerProcesses(1)) as workers:
-            assert workers.result(workers.submit(pieces.square, 3)) == 9
-    finally:
-        signal.signal(signal.SIGINT, handler)
+    with interruptions_noted() as met, closing(WorkerProcesses(1)) as workers:
+        assert workers.result(workers.submit(pieces.square, 3)) == 9
     assert met
     assert capfd.readouterr() == ("", "")
