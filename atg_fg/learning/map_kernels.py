@@ -6,35 +6,55 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.inference.kernels.compilation import compiled, compiled_within
+from atg_fg.inference.kernels.compilation import compiled, compiled_within, written_out
 from atg_fg.learning.kernels import TrialArrays, copy_into, draw_by_logarithm, shuffled
 
-#: Maps whose evidence a chain has at hand: a later one takes the place of an earlier one.
-_N_KNOWN = 4093
+#: Maps whose evidence is at hand, 2 to the power of this: a later one takes the place of an earlier one.
+_KNOWN_BITS = 13
 #: Entries of the table of histories: it begins anew when it is full.
 _N_ENTRIES = 1 << 17
+#: The sources of an action in one number, four bits each; fewer than 16 registers never have the last one.
+_MAX_REGISTERS, _NO_ACTION = 15, 2**64 - 1
+#: An odd number without a pattern, whose multiples spread over all numbers.
+_SPREAD = np.uint64(0x9E3779B97F4A7C15)
 
 #: Without a sign: nobody asks of each index whether it counts from the end.
 Indices = NDArray[np.uint32]
+Codes = NDArray[np.uint64]
 #: What a register has shown in a trial so far, each history once, the empty one first: which of the different looks
 #: each one was [N, T, J], these looks [L, V], the history that each look makes of each, 0 if not known yet [H, L],
 #: prior · Π likelihoods [H, V], ln of its sum [H], and how many are known [1]. Maps differ in which registers are
 #: where, so that few histories come again and again.
 Histories = tuple[Indices, FloatArray, Indices, FloatArray, FloatArray, Indices]
+#: Trials of fresh objects: actions [N, T], lengths [N], ln p(trial | it follows no maps) [N], −∞ if all do, histories.
+FreshTrials = tuple[Indices, IntArray, FloatArray, Histories]
+#: Maps of as many registers, each action's sources as one number [M, A], their evidence [M], and how many actions lose
+#: content [M].
+KnownMaps = tuple[Codes, FloatArray, IntArray]
 
 
 @compiled
-def map_log_evidence(
-    trials: TrialArrays, plain: FloatArray, sources: IntArray, n_slots: int, prior: FloatArray
-) -> float:
+def fresh_trials(trials: TrialArrays, plain: FloatArray, n_slots: int, prior: FloatArray) -> FreshTrials:
+    """Return trials of which no history is known but the empty one; ``prior`` is of the symbols, shape [V]."""
+    return trials.actions.astype(np.uint32), trials.lengths, plain, histories_of(trials.looks, n_slots, prior)
+
+
+def no_maps(n_actions: int) -> KnownMaps:
+    """Return room for known maps."""
+    n_maps = 1 << _KNOWN_BITS
+    return np.full((n_maps, n_actions), _NO_ACTION, np.uint64), np.empty(n_maps), np.empty(n_maps, np.int64)
+
+
+@compiled
+def map_log_evidence(fresh: FreshTrials, sources: IntArray) -> float:
     """Return Σ ln (p(trial | a fresh object that begins in pose 0) + p(trial | plain)) of register maps [A, P]."""
-    return evidence_of(
-        sources.astype(np.uint32),
-        trials.actions.astype(np.uint32),
-        trials.lengths,
-        plain,
-        histories_of(trials.looks, n_slots, prior),
-    )
+    return evidence_of(sources.astype(np.uint32), fresh, room_for(fresh, sources.shape[1]))
+
+
+@compiled_within
+def room_for(fresh: FreshTrials, n_registers: int) -> tuple[Indices, Indices]:
+    """Return room for the register in each place at each look, and for what each register has shown."""
+    return np.empty((fresh[3][0].shape[1] + 1, n_registers), np.uint32), np.empty(n_registers, np.uint32)
 
 
 @compiled_within
@@ -66,18 +86,15 @@ def histories_of(looks: FloatArray, n_slots: int, prior: FloatArray) -> Historie
     return number, rows, longer, product, log_evidence, n_known
 
 
-@compiled_within
-def evidence_of(
-    sources: Indices, actions: Indices, lengths: IntArray, plain: FloatArray, histories: Histories
-) -> float:
+@written_out
+def evidence_of(sources: Indices, fresh: FreshTrials, work: tuple[Indices, Indices]) -> float:
     """Return what ``map_log_evidence`` does, and add what registers showed to the histories that are known."""
-    number, rows, longer, product, log_evidence, n_known = histories
+    actions, lengths, plain, (number, rows, longer, product, log_evidence, n_known) = fresh
     n_registers, n_slots = sources.shape[1], number.shape[2]
-    places = np.empty((number.shape[1] + 1, n_registers), np.uint32)
-    history = np.empty(n_registers, np.uint32)
+    places, history = work
     total = 0.0
     for trial in range(len(lengths)):
-        if n_known[0] + number[trial].size > len(longer):
+        if n_known[0] + number.shape[1] * n_slots > len(longer):
             n_known[0], longer[0] = 1, 0
         for register in range(n_registers):
             places[0, register], history[register] = register, 0
@@ -98,7 +115,8 @@ def evidence_of(
                         product[after, symbol] = product[before, symbol] * rows[row, symbol]
                         evidence += product[after, symbol]
                     log_evidence[after] = np.log(max(evidence, 1e-300))
-                    longer[after] = 0
+                    for look in range(longer.shape[1]):
+                        longer[after, look] = 0
                 history[register] = after
         evidence = 0.0
         for register in range(n_registers):
@@ -109,11 +127,9 @@ def evidence_of(
 
 @compiled
 def anneal_maps(
-    trials: TrialArrays,
-    plain: FloatArray,
+    fresh: FreshTrials,
+    known: KnownMaps,
     sources: IntArray,
-    n_slots: int,
-    prior: FloatArray,
     coldness: FloatArray,
     copies: bool,
     copy_cost: float,
@@ -125,54 +141,58 @@ def anneal_maps(
     sets it to any register.
 
     Args:
-        trials: Scored as those of fresh objects.
-        plain: ln p(trial | it does not follow the maps), shape [N]; −∞ if all do.
+        fresh: Trials of fresh objects.
+        known: Maps whose evidence is at hand; others are added.
         sources: Where to begin, shape [A, P]; changed in place.
-        n_slots: J.
-        prior: Of the symbols, shape [V].
         coldness: β of each sweep over all registers of all actions.
         copies: Whether an action may lose content.
         copy_cost: What each action that does so costs, in nats.
         rng: Draws.
     """
+    codes, evidence, losses = known
     n_actions, n_registers = sources.shape
-    now, actions = sources.astype(np.uint32), trials.actions.astype(np.uint32)
-    histories = histories_of(trials.looks, n_slots, prior)
-    best, kept = -np.inf, now.copy()
+    now, code, unit = sources.astype(np.uint32), np.zeros(n_actions, np.uint64), np.ones(n_registers, np.uint64)
+    for register in range(n_registers):
+        unit[register] <<= np.uint64(4 * (register % 16))
+        for action in range(n_actions):
+            code[action] += now[action, register] * unit[register]
+    best, kept, work = -np.inf, now.copy(), room_for(fresh, n_registers)
     n_options = 2 * n_registers if copies else n_registers
-    scores = np.empty(n_options)
-    scored, known = np.empty(_N_KNOWN), np.full((_N_KNOWN, n_actions, n_registers), np.uint16(65535))
+    scores, coded = np.empty(n_options), np.empty(n_options, np.uint64)
     for beta in coldness:
         for action in range(n_actions):
             for register in shuffled(n_registers, rng):
-                mine = now[action, register]
+                mine, before = now[action, register], code[action]
                 for option in range(n_options):
-                    other = option % n_registers
+                    other = option if option < n_registers else option - n_registers
                     theirs = now[action, other]
-                    now[action, register] = theirs if option < n_registers else other
                     if option < n_registers:
-                        now[action, other] = mine
+                        now[action, register], now[action, other] = theirs, mine
+                        coded[option] = before + (np.uint64(theirs) - np.uint64(mine)) * (unit[register] - unit[other])
+                    else:
+                        now[action, register] = other
+                        coded[option] = before + (np.uint64(other) - np.uint64(mine)) * unit[register]
+                    code[action] = coded[option]
                     # Once a chain is cold, most maps that it looks at are those that it looked at before.
-                    key = np.uint32(0)
+                    key, is_known = np.uint64(0), n_registers <= _MAX_REGISTERS
                     for row in range(n_actions):
-                        for column in range(n_registers):
-                            key = np.uint32(key * np.uint32(31) + now[row, column])
-                    number, is_known = key % np.uint32(_N_KNOWN), True
+                        key = (key + code[row]) * _SPREAD
+                    number = key >> np.uint64(64 - _KNOWN_BITS)
                     for row in range(n_actions):
-                        for column in range(n_registers):
-                            is_known = is_known and known[number, row, column] == now[row, column]
+                        is_known = is_known and codes[number, row] == code[row]
                     if not is_known:
-                        copy_into(known[number], now)
-                        scored[number] = evidence_of(now, actions, trials.lengths, plain, histories)
-                    scores[option] = scored[number]
-                    if copies:
-                        scores[option] -= copy_cost * count_losses(now)
+                        for row in range(n_actions):
+                            codes[number, row] = code[row]
+                        evidence[number] = evidence_of(now, fresh, work)
+                        losses[number] = count_losses(now) if copies else 0
+                    scores[option] = evidence[number] - copy_cost * losses[number]
                     if scores[option] > best:
                         best = scores[option]
                         copy_into(kept, now)
                     now[action, other], now[action, register] = theirs, mine
                 option = draw_by_logarithm(scores, beta, rng)
-                other = option % n_registers
+                code[action] = coded[option]
+                other = option if option < n_registers else option - n_registers
                 if option < n_registers:
                     now[action, register], now[action, other] = now[action, other], mine
                 else:

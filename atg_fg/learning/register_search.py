@@ -40,27 +40,26 @@ def search_registers(
     n_symbols = trials.looks.shape[-1]
     prior = np.full(n_symbols, 1.0 / n_symbols)
     newest = slice(max(len(plain) - N_TRIALS, 0), None)
-    rest = np.ascontiguousarray(plain[newest])
     window = TrialArrays(trials.looks[newest], trials.actions[newest], trials.lengths[newest])
+    fresh = map_kernels.fresh_trials(window, np.ascontiguousarray(plain[newest]), n_slots, prior)
     cooling, cooling_again = np.geomspace(HOTTEST, 1.0, N_SWEEPS), np.geomspace(HOTTEST_COPYING, 1.0, N_COPYING_SWEEPS)
     found: list[SharedStructure] = []
     for n_registers in range(n_slots, n_slots + MAX_HIDDEN + 1):
+        known = map_kernels.no_maps(n_actions)
         best, best_sources = -np.inf, np.zeros((0, 0), dtype=np.int64)
         for _ in range(n_chains):
             sources = np.array([rng.permutation(n_registers) for _ in range(n_actions)])
-            score = map_kernels.anneal_maps(window, rest, sources, n_slots, prior, cooling, False, 0.0, rng)
+            score = map_kernels.anneal_maps(fresh, known, sources, cooling, False, 0.0, rng)
             found.append(_structure(n_slots, sources))
             if score > best:
                 best, best_sources = score, sources
         permutation, other = log_map_priors(n_registers)
         sources, cost = best_sources.copy(), permutation - other
-        map_kernels.anneal_maps(window, rest, sources, n_slots, prior, cooling_again, True, cost, rng)
+        map_kernels.anneal_maps(fresh, known, sources, cooling_again, True, cost, rng)
         found.append(_structure(n_slots, sources))
 
     def score_of(structure: SharedStructure) -> float:
-        sources = np.array(structure.sources)
-        evidence = map_kernels.map_log_evidence(window, rest, sources, n_slots, prior)
-        return float(evidence) + structure.log_prior
+        return map_kernels.map_log_evidence(fresh, np.array(structure.sources)) + structure.log_prior
 
     return sorted(dict.fromkeys(found), key=score_of, reverse=True)
 

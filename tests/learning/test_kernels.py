@@ -152,7 +152,7 @@ def test_paths_with_slips_are_all_there_and_weigh_what_enumeration_says():
 def test_evidence_of_register_maps_is_that_of_their_states():
     trials = drawn_trials(np.random.default_rng(7))
     ring = np.array([[1, 2, 0], [1, 0, 2]])  # place 0 is seen; as maps: where each place takes its content from
-    total = map_kernels.map_log_evidence(trials, np.full(4, -np.inf), ring, 1, PRIOR)
+    total = map_kernels.map_log_evidence(map_kernels.fresh_trials(trials, np.full(4, -np.inf), 1, PRIOR), ring)
     places, number, successors = [(0, 1, 2)], {(0, 1, 2): 0}, []
     for place in places:
         row = []
@@ -174,12 +174,12 @@ def test_annealed_maps_find_the_ring():
     recording, _ = simulated(rng, n_trials=12, n_looks=8, contents=[(0, 1, 2), (2, 1, 0), (1, 0, 2), (0, 0, 1)])
     looks = DetectorNoise.unknown(3).likelihoods(recording.labels, recording.confidences)
     trials = TrialArrays(looks, recording.actions, recording.lengths)
-    sources = np.array([[0, 1, 2], [0, 1, 2]])
+    fresh, sources = map_kernels.fresh_trials(trials, np.full(12, -np.inf), 1, PRIOR), np.array([[0, 1, 2], [0, 1, 2]])
     beta = np.geomspace(0.15, 1.0, 20)
-    found = map_kernels.anneal_maps(trials, np.full(12, -np.inf), sources, 1, PRIOR, beta, False, 0.0, rng)
-    truth = map_kernels.map_log_evidence(trials, np.full(12, -np.inf), np.array([[1, 2, 0], [1, 0, 2]]), 1, PRIOR)
+    found = map_kernels.anneal_maps(fresh, map_kernels.no_maps(2), sources, beta, False, 0.0, rng)
+    truth = map_kernels.map_log_evidence(fresh, np.array([[1, 2, 0], [1, 0, 2]]))
     assert found >= truth - 1e-9
-    assert found == pytest.approx(map_kernels.map_log_evidence(trials, np.full(12, -np.inf), sources, 1, PRIOR))
+    assert found == pytest.approx(map_kernels.map_log_evidence(fresh, sources))
 
 
 def simulated(rng, n_trials, n_looks, contents, wrong=0.0):

@@ -7,7 +7,7 @@ import pytest
 
 from atg_fg.learning import state_merging
 from atg_fg.learning.kernels import TrialArrays
-from atg_fg.learning.map_kernels import anneal_maps, map_log_evidence
+from atg_fg.learning.map_kernels import anneal_maps, fresh_trials, map_log_evidence, no_maps
 from atg_fg.learning.merging_kernels import Automaton, add, unite
 from atg_fg.learning.raw_trials import RawTrial, Recording
 from atg_fg.learning.shared_structure import is_permutation
@@ -92,9 +92,9 @@ def test_exact_evidence_of_all_trials_has_nothing_to_mend(n_trials, seed):
     recording, sources, prior = Recording.of(trials, 12), np.array(merged.structure.sources), np.full(12, 1 / 12)
     looks = np.where(recording.labels[..., None] == np.arange(12), 0.99, 0.01 / 11)
     arrays = TrialArrays(looks, recording.actions, recording.lengths)
-    rest = np.full(n_trials, -60.0), sources, 2, prior
-    before = map_log_evidence(arrays, *rest)
-    after = anneal_maps(arrays, *rest, np.array([1.0, 20.0]), False, 0.0, np.random.default_rng(0))
+    fresh = fresh_trials(arrays, np.full(n_trials, -60.0), 2, prior)
+    before, cold = map_log_evidence(fresh, sources), np.array([1.0, 20.0])
+    after = anneal_maps(fresh, no_maps(len(sources)), sources, cold, False, 0.0, np.random.default_rng(0))
     assert after == before
     assert sources.tolist() == list(map(list, CUBE.sources))
 
