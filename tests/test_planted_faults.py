@@ -15,7 +15,9 @@ TESTS = ["tests/engines/test_agreement.py", "-k", "posterior and (-0] or -1])"]
 #: Of faults in these folders: the compiled filter beside the one in NumPy; kinds of objects beside sums over all cases.
 TESTS_OF = {
     "inference/kernels/": ["tests/inference/kernels/test_compiled_filter.py"],
-    "learning/pose_": ["tests/learning/test_likelihood.py", "-k", "known_are_filtered or clean_trial"],
+    "learning/pose_chain": ["tests/learning/test_pose_chain.py", "-k", "sum_over_poses"],
+    "learning/pose_": ["tests/learning/test_likelihood.py", "-k", "known_are_filtered or clean_trial or after_slips"],
+    "learning/prediction": ["tests/learning/test_pose_filter.py", "-k", "predicted"],
     "learning/learner": ["tests/learning/test_learner.py", "-k", "remembered_object"],
     "learning/": [f"tests/learning/test_{name}.py" for name in ("state_merging", "kinds", "plain_evidence")],
 }
@@ -217,6 +219,42 @@ FAULTS = [
         "learning/pose_kernels.py",
         "acted[3][row] *= 1.0 - slip",
         "acted[3][row] *= 1.0",
+    ),
+    Fault(
+        "poses: an action that turned the object still counts as failed",
+        "learning/pose_kernels.py",
+        "moved[FAILED + action] = 0.0",
+        "moved[FAILED + action] = failed_before",
+    ),
+    Fault(
+        "poses: which action failed is not remembered",
+        "learning/pose_kernels.py",
+        "stayed[FAILED + action] = 1.0",
+        "stayed[FAILED + action] = failed_before",
+    ),
+    Fault(
+        "poses: what is predicted leaves out which action failed",
+        "learning/prediction_kernels.py",
+        "slip = (1.0 - failed_before) * slips[0] + failed_before * slips[1]",
+        "slip = slips[0]",
+    ),
+    Fault(
+        "pose chain: any action that failed makes the others fail",
+        "learning/pose_chain.py",
+        "slip = rates.slips[bool(failed & own)]",
+        "slip = rates.slips[bool(failed)]",
+    ),
+    Fault(
+        "kinds: an action that fails over and over counts each time",
+        "learning/kinds.py",
+        "events = wrong + kind.events[:, SLIP] - kind.events[:, AGAIN]",
+        "events = wrong + kind.events[:, SLIP]",
+    ),
+    Fault(
+        "rates: whether slips come together is told by the kinds in force",
+        "learning/kinds.py",
+        "return Tally(*map(sum, zip(*tallies, strict=True))), commonest.tally(trials, alone)",
+        "return (Tally(*map(sum, zip(*tallies, strict=True))),) * 2",
     ),
     Fault(
         "poses: a look reveals nothing",

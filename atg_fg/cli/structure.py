@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import asdict
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -111,7 +110,7 @@ def _document(
         "command": "structure show",
         "trials": len(learner.trials),
         "evaluations": learner.n_evaluations,
-        "rates": asdict(learner.rates),
+        "rates": learner.rates.by_name(),
         "structures": [
             _structure_document(each, learner.gain + math.log(each.weight / believed[0].weight), memory)
             for each in believed
@@ -201,7 +200,7 @@ def _tell(file: Path, document: dict[str, Any]) -> None:
             f"a kind of {_objects(len(kind['members']))}, plain ATGs",
             soft_wrap=True,
         )
-    rates = ", ".join(f"{name} {value:.4f}" for name, value in document["rates"].items())
+    rates = ", ".join(f"{name.replace('_', ' ')} {value:.4f}" for name, value in document["rates"].items())
     console.print(f"rates: {rates}")
     kinds = ("observed", "predicted", "unknown")
     rows = (

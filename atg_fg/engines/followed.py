@@ -132,7 +132,7 @@ class FollowedStructure(FollowedPoses[PoseFilter]):
             self.filter.observe_pattern(self._alphabet.symbols[evidence.pattern])
 
     def chain(self, hypothesis: int, history: History) -> tuple[Chain, IntArray] | None:
-        """Return the trial under one object whose aspects are the poses, and the pattern of each pose, −1 if unknown.
+        """Return the trial under one object as ``pose_chain`` has it, and the pattern of each state, −1 if unknown.
 
         The contents are those that the trial has left, taken as known. ``None`` if the object has been ruled out.
         """
@@ -141,7 +141,7 @@ class FollowedStructure(FollowedPoses[PoseFilter]):
             return None
         chain = pose_chain(self._poses, learned[None], np.ones(1), self._rates, self._alphabet, history)
         certainty, patterns = most_probable_patterns(self._poses, learned, self._rates, self._alphabet)
-        return chain, np.where(certainty > 0.5, patterns, -1)
+        return chain, np.resize(np.where(certainty > 0.5, patterns, -1), chain.initial.shape[1])
 
     def smoothed_patterns(self, hypothesis: int, inference: Inference) -> list[FloatArray]:
         """Return p(pattern shown at time s | O = hypothesis, all evidence) of every time s, each of shape [|𝒵|].
@@ -155,7 +155,8 @@ class FollowedStructure(FollowedPoses[PoseFilter]):
         chain = pose_chain(self._poses, contents, np.ones(1), self._rates, self._alphabet, inference.history)
         shown = pose_patterns(self._poses, contents, self._rates, self._alphabet)[0]
         patterns = []
-        for time, marginal in enumerate(forward_backward(chain)):
+        for time, of_states in enumerate(forward_backward(chain)):
+            marginal = of_states.reshape(-1, len(shown)).sum(axis=0)
             likelihood = np.ones(len(self._alphabet)) if time >= len(evidence) else evidence[time].likelihood
             noise = self._rates.wrong / len(self._alphabet) * likelihood.sum()
             given_pose = shown * ((1.0 - self._rates.wrong) * likelihood + noise)

@@ -9,7 +9,7 @@ import numpy as np
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.patterns import FloatArray
 from atg_fg.learning.likelihood import TrialScores, score_trials
-from atg_fg.learning.rates import Rates, Tally
+from atg_fg.learning.rates import FAILED, Rates, Tally
 from atg_fg.learning.raw_trials import RawTrial
 from atg_fg.learning.shared_structure import SharedStructure
 
@@ -24,7 +24,7 @@ class Candidate:
     Attributes:
         log_evidence: ln p(trial | structure) given ``NEW``, ``FILED`` and ``BEFORE``, shape [3, n]. The last sums over
             the object that a trial is filed under and a new one alone.
-        events: Expected slips, wrong looks, repeated symbols and revealed registers of each trial, shape [n, 4].
+        events: Expected numbers in each trial, columns as ``atg_fg.learning.rates`` has them, shape [n, FAILED].
         contents: What is known of each object, each of shape [P, S].
     """
 
@@ -36,7 +36,7 @@ class Candidate:
     def forget(self) -> None:
         """Have all trials scored anew, and the contents of all objects learned anew."""
         self.log_evidence: FloatArray = np.zeros((3, 0))
-        self.events: FloatArray = np.zeros((0, 4))
+        self.events: FloatArray = np.zeros((0, FAILED))
         self.contents: list[FloatArray] = []
 
     def catch_up(self, trials: Sequence[RawTrial], owners: Sequence[int], rates: Rates) -> None:
@@ -98,7 +98,7 @@ class Candidate:
             trials: All raw trials.
             following: The probability that each follows it, shape [n].
         """
-        slips, wrong, repeats, reveals = following @ self.events
+        slips, wrong, repeats, reveals, again, n_failed_before = following @ self.events
         n_actions = following @ np.array([len(trial.actions) for trial in trials])
         n_looks = following @ np.array([len(trial.detections) for trial in trials])
-        return Tally(*map(float, (slips, n_actions, wrong, n_looks, repeats, reveals)))
+        return Tally(*map(float, (slips, n_actions, again, n_failed_before, wrong, n_looks, repeats, reveals)))

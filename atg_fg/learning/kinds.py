@@ -14,8 +14,7 @@ import numpy as np
 from atg_fg.core.patterns import FloatArray
 from atg_fg.learning.candidate import Candidate
 from atg_fg.learning.likelihood import BEFORE
-from atg_fg.learning.pose_filter import SLIP, WRONG
-from atg_fg.learning.rates import Rates
+from atg_fg.learning.rates import AGAIN, SLIP, WRONG, Rates, Tally
 from atg_fg.learning.raw_trials import RawTrial
 
 #: Columns of what is no structure: plain, and plain with uncertain actions.
@@ -25,7 +24,8 @@ PLAIN_BEFORE: Final = (1.0, 0.05)
 #: Structures that one memory may have kinds of.
 MAX_KINDS: Final = 5
 #: A trial that takes more wrong looks than this for one of a kind, or slips and wrong looks, is none of it: a, b of
-#: a + b · looks. What is nearly right would else hide a kind that is not known yet.
+#: a + b · looks. What is nearly right would else hide a kind that is not known yet. An action that fails over and over
+#: counts once.
 WRONG_LIMIT: Final = (1.5, 0.03)
 EVENT_LIMIT: Final = (1.5, 0.1)
 #: These limits are for rates as they are beforehand: so many times what those in force foretell beyond them is added.
@@ -92,7 +92,8 @@ def kind_table(
     most_events = EVENT_LIMIT[0] + EVENT_LIMIT[1] * n_looks + EXCESS_FACTOR * excess_events
     columns, most = [plain], plain.max(axis=1)
     for kind in kinds:
-        wrong, events = kind.events[:, WRONG], kind.events[:, WRONG] + kind.events[:, SLIP]
+        wrong = kind.events[:, WRONG]
+        events = wrong + kind.events[:, SLIP] - kind.events[:, AGAIN]
         errs = (wrong > most_wrong) | (events > most_events)
         evidence = kind.log_evidence[given]
         columns.append(np.where(errs, np.minimum(evidence, most - REFUSED), evidence))
@@ -145,6 +146,25 @@ def choose_kinds(
         best = better
     rivals = sorted(neighbours, key=lambda each: -each.log_evidence)[: MAX_BELIEVED - 1]
     return [best, *(each for each in rivals if each.log_evidence > best.log_evidence - BELIEVED_WITHIN)]
+
+
+def tally_events(
+    kinds: KindSet, pool: Sequence[Candidate], plain: FloatArray, trials: Sequence[RawTrial], rates: Rates
+) -> tuple[Tally, Tally]:
+    """Return the events in all trials of a set of structures, and in those of its commonest one if it were alone.
+
+    Args:
+        kinds: The set, not empty.
+        pool: Structures, scored on all trials.
+        plain: ln p(trial | plain) of the two plain kinds, shape [n, 2].
+        trials: All raw trials.
+        rates: Those in force.
+    """
+    following = kinds.trials.responsibilities.T[N_PLAIN:]
+    tallies = [pool[number].tally(trials, own) for number, own in zip(kinds.structures, following, strict=True)]
+    commonest = pool[kinds.structures[following.sum(axis=1).argmax()]]
+    alone = share_kinds(kind_table([commonest], plain, trials, rates)).responsibilities[:, N_PLAIN]
+    return Tally(*map(sum, zip(*tallies, strict=True))), commonest.tally(trials, alone)
 
 
 def _is_kind(candidate: Candidate, following: FloatArray, n_looks: FloatArray) -> bool:

@@ -9,6 +9,7 @@ nothing to be found.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Final
 
 import numpy as np
@@ -17,11 +18,11 @@ from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.patterns import MISSING, FloatArray
 from atg_fg.learning.believed_structure import BelievedStructure, UncertainObjects
 from atg_fg.learning.candidate import Candidate
-from atg_fg.learning.kinds import N_PLAIN, UNCERTAIN_KIND, KindSet, choose_kinds, kind_table, share_kinds
+from atg_fg.learning.kinds import N_PLAIN, UNCERTAIN_KIND, KindSet, choose_kinds, kind_table, share_kinds, tally_events
 from atg_fg.learning.likelihood import FILED, NEW
 from atg_fg.learning.milestones import is_milestone
 from atg_fg.learning.plain_evidence import USUAL, PlainEvidence, PlainNoise
-from atg_fg.learning.rates import Rates, Tally, estimate_rates
+from atg_fg.learning.rates import Rates, estimate_rates
 from atg_fg.learning.raw_trials import RawTrial, Recording
 from atg_fg.learning.shared_structure import SharedStructure
 from atg_fg.learning.state_merging import merged_draws
@@ -380,16 +381,12 @@ class StructureLearner:
         best = self._sets[0]
         if not best.structures:
             return
-        tallies = [
-            self._candidates[number].tally(self.trials, following)
-            for number, following in zip(best.structures, best.trials.responsibilities.T[N_PLAIN:], strict=True)
-        ]
-        tally = Tally(*map(sum, zip(*tallies, strict=True)))
+        tally, alone = tally_events(best, self._candidates, self._of_plain(), self.trials, self.rates)
         followers = self._members(best, list(self._objects))[:-1, N_PLAIN:].sum(axis=1)
-        estimated = estimate_rates(tally, followers)
-        old, new = (np.array([each.slip, each.wrong, each.repeat]) for each in (self.rates, estimated))
+        estimated = estimate_rates(tally, followers, alone)
+        old, new = (np.array([*each.slips, each.wrong, each.repeat]) for each in (self.rates, estimated))
         if np.abs(np.log(new / old)).max() < np.log(RATE_FACTOR):
-            self.rates = Rates(self.rates.slip, self.rates.wrong, self.rates.repeat, estimated.share)
+            self.rates = replace(self.rates, share=estimated.share)
             return
         self.rates = estimated
         self._forget_scores()

@@ -10,7 +10,7 @@ import numpy as np
 
 from atg_fg.core.patterns import MISSING, FloatArray, PatternAlphabet
 from atg_fg.learning.pose_filter import PoseFilter
-from atg_fg.learning.rates import Rates
+from atg_fg.learning.rates import FAILED, Rates
 from atg_fg.learning.raw_trials import RawTrial, TrialArrays, side_by_side
 from atg_fg.learning.shared_structure import SharedStructure
 
@@ -24,7 +24,7 @@ class TrialScores(NamedTuple):
 
     Attributes:
         log_evidence: ln p(trial | structure, what was known of its object), shape [N].
-        events: Expected slips, wrong looks, repeated symbols and revealed registers, shape [N, 4].
+        events: Expected numbers, columns as ``atg_fg.learning.rates`` has them, shape [N, FAILED].
         contents: What is known of the objects after the trials, shape [N, P, S].
     """
 
@@ -51,7 +51,7 @@ def score_trials(
     """
     shape = (len(trials), structure.n_registers, alphabet.n_symbols)
     before = np.zeros(shape) if contents is None else contents
-    scores = TrialScores(np.zeros(len(trials)), np.zeros((len(trials), 4)), before.copy())
+    scores = TrialScores(np.zeros(len(trials)), np.zeros((len(trials), FAILED)), before.copy())
     by_length: defaultdict[int, list[int]] = defaultdict(list)
     for number, trial in enumerate(trials):
         by_length[len(trial.actions)].append(number)

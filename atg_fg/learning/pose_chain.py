@@ -1,15 +1,19 @@
 """A trial of objects that follow a structure as a chain whose aspects are the poses: the factor graph of a structure.
 
-Given what the registers contain, the pose is all there is to know: X_t is the pose, an action turns it or slips, and a
-look shows the contents of the registers in view. So the tables are those of any other recognition trial, and
-``RecognitionGraph`` takes them as they are.
+Given what the registers contain, the pose and which actions failed when they were last done are all there is to know:
+these are X_t, an action turns the pose or slips, and a look shows the contents of the registers in view. So the tables
+are those of any other recognition trial, and ``RecognitionGraph`` takes them as they are.
 """
 
 from __future__ import annotations
 
+from collections import Counter
+from collections.abc import Sequence
+from typing import Final
+
 import numpy as np
 
-from atg_fg.core.actions import mixed
+from atg_fg.core.actions import AnyAction, UncertainAction, mixed
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import FloatArray, PatternAlphabet
 from atg_fg.inference.chain import Chain
@@ -17,6 +21,9 @@ from atg_fg.inference.history import History
 from atg_fg.learning import register_contents
 from atg_fg.learning.rates import Rates
 from atg_fg.learning.shared_structure import Poses
+
+#: Poses times sets of failed actions that a chain may have.
+MAX_STATES: Final = 2_000
 
 
 def pose_patterns(poses: Poses, contents: FloatArray, rates: Rates, alphabet: PatternAlphabet) -> FloatArray:
@@ -40,9 +47,11 @@ def pose_patterns(poses: Poses, contents: FloatArray, rates: Rates, alphabet: Pa
 def pose_chain(
     poses: Poses, contents: FloatArray, prior: FloatArray, rates: Rates, alphabet: PatternAlphabet, history: History
 ) -> Chain:
-    """Return the chain of a trial: O is which of H objects it is, X_s the pose.
+    """Return the chain of a trial: O is which of H objects it is, X_s the pose and which actions failed.
 
-    It is exact for objects whose contents are known. Registers that are not known count as drawn anew at each look.
+    State f · G + g is pose g of G, and bit k of f says whether the action at place k of ``repeated_actions`` failed
+    when it was last done. It is exact for objects whose contents are known. Registers that are not known count as drawn
+    anew at each look.
 
     Args:
         poses: Of the structure.
@@ -55,13 +64,17 @@ def pose_chain(
     if not history.evidence:
         raise InvalidInputError("trial: nothing observed yet; expected a first observation")
     n_objects, n_poses = len(contents), len(poses.registers)
-    shown = pose_patterns(poses, contents, rates, alphabet)
-    turns = [_transition(poses, action, rates.slip) for action in range(poses.successors.shape[1])]
+    repeated = repeated_actions(history.actions, n_poses)
+    n_states = n_poses * 2 ** len(repeated)
+    shown = np.tile(pose_patterns(poses, contents, rates, alphabet), (1, n_states // n_poses, 1))
+    turns = [_transition(poses, action, rates, repeated) for action in range(poses.successors.shape[1])]
+    initial = np.zeros((n_objects, n_states))
+    initial[:, :n_poses] = 1.0 / n_poses
     return Chain(
         prior,
-        np.full((n_objects, n_poses), 1.0 / n_poses),
+        initial,
         tuple(
-            np.broadcast_to(mixed(action, turns.__getitem__, np.eye(n_poses)), (n_objects, n_poses, n_poses))
+            np.broadcast_to(mixed(action, turns.__getitem__, np.eye(n_states)), (n_objects, n_states, n_states))
             for action in history.actions
         ),
         tuple(
@@ -72,8 +85,24 @@ def pose_chain(
     )
 
 
-def _transition(poses: Poses, action: int, slip: float) -> FloatArray:
-    """Return p(next pose | pose, action), shape [G, G]."""
-    table = slip * np.eye(len(poses.successors))
-    table[np.arange(len(table)), poses.successors[:, action]] += 1.0 - slip
-    return table
+def repeated_actions(actions: Sequence[AnyAction], n_poses: int) -> list[int]:
+    """Return the actions that may have been done more than once, as many as there is room for, most frequent first."""
+    done = Counter(
+        each
+        for action in actions
+        for each in (dict(action.chances) if isinstance(action, UncertainAction) else [action])
+    )
+    repeated = [action for action, times in done.most_common() if times > 1]
+    return repeated[: (MAX_STATES // n_poses).bit_length() - 1]
+
+
+def _transition(poses: Poses, action: int, rates: Rates, repeated: Sequence[int]) -> FloatArray:
+    """Return p(next state | state, action), shape [F · G, F · G]."""
+    n_poses, n_failed = len(poses.successors), 2 ** len(repeated)
+    own = 1 << repeated.index(action) if action in repeated else 0
+    table, pose = np.zeros((n_failed, n_poses, n_failed, n_poses)), np.arange(n_poses)
+    for failed in range(n_failed):
+        slip = rates.slips[bool(failed & own)]
+        table[failed, pose, failed & ~own, poses.successors[:, action]] += 1.0 - slip
+        table[failed, pose, failed | own, pose] += slip
+    return table.reshape(n_failed * n_poses, -1)

@@ -5,7 +5,7 @@ A look weighs the rows and reveals registers; an action turns each pose, and lea
 of one object that come to the same pose become one, whose table has their mean. That is the approximation: the rest of
 what they knew, how registers depend on each other and on the way the pose was reached, is given up. The rows of a known
 object all have one table, and of a new one that never slips no two that began alike are in one pose: both are filtered
-exactly.
+exactly, but that rows that become one also have the mean of how probably each action failed when it was last done.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from atg_fg.core.actions import AnyAction, UncertainAction
 from atg_fg.core.log_math import log_sum_exp
 from atg_fg.core.patterns import FloatArray, IntArray, PatternAlphabet
-from atg_fg.learning.rates import Rates
+from atg_fg.learning.rates import FAILED, REPEAT, REVEAL, WRONG, Rates
 from atg_fg.learning.register_contents import (
     SAME,
     TINY,
@@ -37,8 +37,6 @@ from atg_fg.learning.shared_structure import Poses
 UNIMPORTANT: Final = 1e-6
 #: A row that is by no more than this above one half is not preferred to the others.
 EVEN: Final = 1e-3
-#: Columns of ``Rows.events``.
-SLIP, WRONG, REPEAT, REVEAL = range(4)
 
 
 class Rows(NamedTuple):
@@ -51,8 +49,8 @@ class Rows(NamedTuple):
         pose: Shape [R].
         weight: p(start, pose | owner, what was seen), shape [R].
         table: Index of the row's table of contents, shape [R]; rows that know the same share one.
-        events: Expected slips, wrong looks, repeated symbols and revealed registers so far, shape [R, 4]; those of
-            rivals for one trial do not count.
+        events: Expected numbers so far, and of each action how probably it failed when it was last done, columns as
+            ``atg_fg.learning.rates`` has them, shape [R, FAILED + A]; what rivals for one trial reveal does not count.
     """
 
     owner: IntArray
@@ -101,7 +99,8 @@ class PoseFilter:
         start = np.where(is_known[owner], 0, position)
         pose = np.where(is_known[owner], position, poses.first[start])
         weight = np.where(is_known[owner], 1.0 / n_poses, poses.first_weights[start])
-        self.rows = Rows(owner, start, pose, weight, owner, np.zeros((len(owner), 4)))
+        events = np.zeros((len(owner), FAILED + poses.successors.shape[1]))
+        self.rows = Rows(owner, start, pose, weight, owner, events)
         self._contents = contents
         self._shown = symbol_probabilities(contents, rates.repeat)
         n_slots = len(alphabet.slots)
@@ -138,7 +137,7 @@ class PoseFilter:
 
     def act_apart(self, actions: IntArray) -> None:
         """Take in an action of each owner, shape [H]."""
-        self.rows = Rows(*self._kernels.act(tuple(self.rows), self._successors, actions, self._rates.slip))
+        self.rows = Rows(*self._kernels.act(tuple(self.rows), self._successors, actions, self._rates.slips))
 
     def observe_pattern(self, symbols: IntArray) -> None:
         """Take in looks that showed every slot, shape [J], or [H, J] for a look of each owner."""
@@ -155,7 +154,7 @@ class PoseFilter:
             (self._successors, self._registers_in_view, self._possible, len(self._poses.first)),
             actions,
             symbols,
-            (rates.slip, rates.wrong, rates.wrong / len(self._alphabet), rates.repeat),
+            (*rates.slips, rates.wrong, rates.wrong / len(self._alphabet), rates.repeat),
             self.log_evidence,
             log_weights,
         )
@@ -186,20 +185,22 @@ class PoseFilter:
 
     def predicted_patterns(self) -> tuple[IntArray, FloatArray]:
         """Return the owners that matter, shape [I], and p(next pattern | action, owner) of each, shape [A, I, |𝒵|]."""
-        owners, patterns = self._patterns_after(self._successors, self._rates.slip)
+        owners, patterns = self._patterns_after(self._successors, self._rates.slips)
         return owners, (1.0 - self._rates.wrong) * patterns + self._rates.wrong / len(self._alphabet)
 
     def shown_patterns(self) -> tuple[IntArray, FloatArray]:
         """Return the owners that matter, shape [I], and p(pattern shown now | owner) of each, shape [I, |𝒵|]."""
-        owners, (patterns,) = self._patterns_after(np.arange(len(self._successors))[:, None], 0.0)
+        owners, (patterns,) = self._patterns_after(np.arange(len(self._successors))[:, None], (0.0, 0.0))
         return owners, patterns
 
-    def _patterns_after(self, successors: IntArray, slip: float) -> tuple[IntArray, FloatArray]:
+    def _patterns_after(self, successors: IntArray, slips: tuple[float, float]) -> tuple[IntArray, FloatArray]:
         """Return the owners that matter, and p(pattern shown after each move of [P', A] | owner), shape [A, I, |𝒵|]."""
         structure = (successors, self._registers_in_view, self._possible)
         importance, symbols = self._importance() / UNIMPORTANT, self._alphabet.symbols
-        owners, patterns = self._kernels.patterns_after(
-            tuple(self.rows), self._shown, structure, symbols, importance, slip
+        from atg_fg.learning import prediction_kernels  # they load Numba
+
+        owners, patterns = prediction_kernels.patterns_after(
+            self.rows[:], self._shown, structure, symbols, importance, slips
         )
         return owners, patterns
 
@@ -227,9 +228,9 @@ class PoseFilter:
         return mean
 
     def expected_events(self) -> FloatArray:
-        """Return the expected slips, wrong looks, repeated symbols and revealed registers of each owner, [H, 4]."""
-        events = np.zeros((len(self.log_evidence), 4))
-        np.add.at(events, self.rows.owner, self.rows.weight[:, None] * self.rows.events)
+        """Return the expected numbers of each owner, columns as ``atg_fg.learning.rates`` has them, [H, FAILED]."""
+        events = np.zeros((len(self.log_evidence), FAILED))
+        np.add.at(events, self.rows.owner, self.rows.weight[:, None] * self.rows.events[:, :FAILED])
         return events
 
     @property

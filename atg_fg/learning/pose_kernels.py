@@ -7,6 +7,7 @@ import numpy as np
 from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.inference.kernels.compilation import compiled, compiled_within
 from atg_fg.learning.kernels import add_share, copy_into
+from atg_fg.learning.rates import AGAIN, FAILED, FAILED_BEFORE, REPEAT, REVEAL, SLIP, WRONG
 from atg_fg.learning.register_contents import SAME, TINY
 
 #: Rows less probable than this are dropped.
@@ -155,8 +156,8 @@ def reveal(
             expected = shown[of_row[row], register, symbol]
             revealed = truth[row] * (1.0 - before / max(expected, TINY))
             from_all = repeat / n_symbols * max(1.0 - rest, 0.0)
-            events[row, 2] += revealed * min(from_all / max(expected - before, TINY), 1.0)
-            events[row, 3] += revealed
+            events[row, REPEAT] += revealed * min(from_all / max(expected - before, TINY), 1.0)
+            events[row, REVEAL] += revealed
         if not is_known:
             changed[n_changed] = row
             n_changed += 1
@@ -289,7 +290,7 @@ def follow(
     structure: tuple[IntArray, IntArray, FloatArray, int],
     actions: IntArray,
     seen: IntArray,
-    rates: tuple[float, float, float, float],
+    rates: tuple[float, float, float, float, float],
     log_evidence: FloatArray,
     log_weights: FloatArray,
 ) -> tuple[Rows, Known]:
@@ -302,15 +303,15 @@ def follow(
             different, else 0, of each pose [P'], and how many starts there are.
         actions: Of each owner between the looks, shape [T − 1, H].
         seen: The symbol in each slot at each look, of each owner, shape [T, H, J].
-        rates: Of slips, of wrong looks and of one that shows a pattern, and κ.
+        rates: Of slips, ε and ε′, of wrong looks and of one that shows a pattern, and κ.
         log_evidence: ln p(what was seen | owner), shape [H]; that of the looks is added.
         log_weights: ln of the weight of each owner, shape [H]; of shape [0] if each is a trial of its own.
     """
     successors, registers, possible, n_starts = structure
-    slip, wrong, wrong_pattern, repeat = rates
+    slip, slip_again, wrong, wrong_pattern, repeat = rates
     for look in range(len(seen)):
         if look > 0:
-            rows = act(rows, successors, actions[look - 1], slip)
+            rows = act(rows, successors, actions[look - 1], (slip, slip_again))
         owner, start, pose, weight, table, events = rows
         in_view = registers[pose]
         probability = probability_of_look(owner, table, in_view, possible[pose], known[1], seen[look])
@@ -318,15 +319,18 @@ def follow(
         kept, truth, weight = weigh(owner, weight, ((1.0 - wrong) * probability, wrong_look), log_evidence, log_weights)
         rows = (owner[kept], start[kept], pose[kept], weight, table[kept], events[kept])
         for row in range(len(truth)):
-            rows[5][row, 1] += 1.0 - truth[row]
+            rows[5][row, WRONG] += 1.0 - truth[row]
         tables, changed = reveal(rows, known, registers, seen[look], truth, repeat)
         rows, known = merged(rows, known, tables, changed, (n_starts, len(registers)), repeat)
     return rows, known
 
 
 @compiled
-def act(rows: Rows, successors: IntArray, actions: IntArray, slip: float) -> Rows:
-    """Move each row by the action of its owner, and leave a second one behind for a slip, after all that moved."""
+def act(rows: Rows, successors: IntArray, actions: IntArray, slips: tuple[float, float]) -> Rows:
+    """Move each row by the action of its owner, and leave a second one behind for a slip, after all that moved.
+
+    How probable a slip is, depends on how probably the action failed when it was last done.
+    """
     owner, start, pose, weight, table, events = rows
     n_rows = len(owner)
     both = np.empty(2 * n_rows, np.int64)
@@ -334,63 +338,17 @@ def act(rows: Rows, successors: IntArray, actions: IntArray, slip: float) -> Row
         both[row] = both[n_rows + row] = row
     acted = (owner[both], start[both], pose[both], weight[both], table[both], events[both])
     for row in range(n_rows):
-        acted[2][row] = successors[pose[row], actions[owner[row]]]
+        action, moved, stayed = actions[owner[row]], acted[5][row], acted[5][n_rows + row]
+        failed_before = moved[FAILED + action]
+        again = failed_before * slips[1]
+        slip = (1.0 - failed_before) * slips[0] + again
+        acted[2][row] = successors[pose[row], action]
         acted[3][row] *= 1.0 - slip
         acted[3][n_rows + row] *= slip
-        acted[5][n_rows + row, 0] += 1.0
+        moved[FAILED_BEFORE] += (failed_before - again) / (1.0 - slip)
+        moved[FAILED + action] = 0.0
+        stayed[SLIP] += 1.0
+        stayed[AGAIN] += again / slip
+        stayed[FAILED_BEFORE] += again / slip
+        stayed[FAILED + action] = 1.0
     return acted
-
-
-@compiled
-def patterns_after(
-    rows: Rows,
-    shown: FloatArray,
-    structure: tuple[IntArray, IntArray, FloatArray],
-    symbols: IntArray,
-    importance: FloatArray,
-    slip: float,
-) -> tuple[IntArray, FloatArray]:
-    """Return the owners that matter, shape [I], and p(pattern shown after an action | owner), shape [A, I, |𝒵|].
-
-    Args:
-        rows: What is believed.
-        shown: The probability of each symbol in each register of each table, shape [K, P, S].
-        structure: Successors of each pose [P', A], the register in each slot of each pose [P', J], and 1 where these
-            are different, else 0, of each pose [P'].
-        symbols: Of every pattern, shape [|𝒵|, J].
-        importance: Of each owner, shape [H]; rows count if it times their weight is above 1.
-        slip: The probability that an action leaves the pose as it is.
-    """
-    owner, _, pose, weight, table, _ = rows
-    successors, registers, possible = structure
-    n_actions, (n_patterns, n_slots) = successors.shape[1], symbols.shape
-    # Loops: expressions of whole arrays take longer to compile than all of this.
-    total, n_owners = np.zeros(len(importance)), 0
-    for row in range(len(owner)):
-        if weight[row] * importance[owner[row]] > 1.0:
-            total[owner[row]] += weight[row]
-    owners, number = np.empty(len(total), np.int64), np.empty(len(total), np.int64)
-    for each in range(len(total)):
-        if total[each] > 0:
-            owners[n_owners], number[each] = each, n_owners
-            n_owners += 1
-    # That nothing happens is one more thing that an action may do.
-    result = np.zeros((n_actions + 1, n_owners, n_patterns))
-    for row in range(len(owner)):
-        if not weight[row] * importance[owner[row]] > 1.0:
-            continue
-        of, own, share = shown[table[row]], number[owner[row]], weight[row] / total[owner[row]]
-        for action in range(n_actions + 1):
-            after = successors[pose[row], action] if action < n_actions else pose[row]
-            in_view, happens = registers[after], 1.0 - slip if action < n_actions else slip
-            factor = share * happens * possible[after] / max(different(of, in_view), TINY)
-            for pattern in range(n_patterns):
-                probability = factor
-                for slot in range(n_slots):
-                    probability *= of[in_view[slot], symbols[pattern, slot]]
-                result[action, own, pattern] += probability
-    for action in range(n_actions):
-        for own in range(n_owners):
-            for pattern in range(n_patterns):
-                result[action, own, pattern] += result[n_actions, own, pattern]
-    return owners[:n_owners], result[:n_actions]

@@ -29,7 +29,7 @@ def write_learner(learner: StructureLearner, first: int = 0) -> dict[str, Any]:
     return {
         "seed": learner.seed,
         "evaluations": learner.n_evaluations,
-        "rates": {name: getattr(learner.rates, name) for name in PRIORS},
+        "rates": learner.rates.by_name(),
         **({"uncertain": learner.noise._asdict()} if learner.noise != USUAL else {}),
         "candidates": [write_structure(structure, learner.assumptions) for structure in learner.candidates],
         "trials": [
@@ -211,6 +211,6 @@ def _read_sources(value: Any, n_registers: int, place: str) -> tuple[int, ...]:
 
 def _read_rates(value: Any, place: str) -> Rates:
     """Return the rates at ``place``, or raise ``InvalidInputError`` naming it."""
-    fields = read_object(value, place, tuple(PRIORS))
+    fields = read_object(value, place, tuple(PRIORS.keys() - {"slip_again"}), optional=("slip_again",))
     with placed(place):
         return Rates(**fields)

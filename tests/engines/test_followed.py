@@ -47,17 +47,17 @@ def test_plain_atgs_with_uncertain_actions_learn_within_the_trial_as_in_the_baye
 
 
 LOOKS = [
-    ((0, 1), (1, 2), (0, 2)),
-    ((0, 1), (0, 1), (None, 2)),
-    ((0, 1), (2, 0), (None, None)),
-    ((0, 1), (3, 4), (1, 0)),
+    (((0, 1), (1, 2), (0, 2)), (0, 1)),
+    (((0, 1), (0, 1), (None, 2)), (0, 0)),
+    (((0, 1), (2, 0), (None, None)), (0, 1)),
+    (((0, 1), (3, 4), (1, 0)), (1, 1)),
 ]
 
 
-@pytest.mark.parametrize("looks", LOOKS)
-def test_smoothed_patterns_of_a_structure_are_sums_over_all_that_may_have_happened(looks):
+@pytest.mark.parametrize(("looks", "actions"), LOOKS)
+def test_smoothed_patterns_of_a_structure_are_sums_over_all_that_may_have_happened(looks, actions):
     """An action turns the ring or slips, and a look is of what the pose shows or of a pattern drawn uniformly."""
-    rates, alphabet, actions = Rates(slip=0.2, wrong=0.15, repeat=1e-12), RING_WORLD.alphabet, (0, 1)
+    rates, alphabet = Rates(slip=0.2, slip_again=0.7, wrong=0.15, repeat=1e-12), RING_WORLD.alphabet
     memory, contents = RobotMemory(RING_WORLD), np.eye(5)[[[0, 1, 2]]]
     believed = BelievedStructure(RING, 1.0, np.ones(1), contents, 0.5)
     followed = FollowedStructure(believed, np.log([0.5, 0.5]), rates, memory)
@@ -75,13 +75,16 @@ def test_smoothed_patterns_of_a_structure_are_sums_over_all_that_may_have_happen
     shown = [alphabet.symbols.tolist().index(list(pattern)) for pattern in ring.patterns]
     likelihoods = [Evidence.of_detection(alphabet, look).likelihood for look in looks]
     expected = np.zeros((3, n))
-    for path in itertools.product(range(len(shown)), repeat=3):
-        weight = 1.0
+    for start, *slips in itertools.product(range(len(shown)), (False, True), (False, True)):
+        path, weight, failed = [start], 1.0, set()
+        for action, slipped in zip(actions, slips, strict=True):
+            path.append(path[-1] if slipped else poses.successors[path[-1], action])
+            slip = 0.7 if action in failed else 0.2
+            weight *= slip if slipped else 1.0 - slip
+            failed = failed | {action} if slipped else failed - {action}
         for time, likelihood in enumerate(likelihoods):
             right, wrong = 0.85 * likelihood[shown[path[time]]], 0.15 * sum(likelihood[drawn] / n for drawn in range(n))
             weight *= right + wrong
-        for (before, after), action in zip(itertools.pairwise(path), actions, strict=True):
-            weight *= 0.8 * (after == poses.successors[before, action]) + 0.2 * (after == before)
         for time, pose in enumerate(path):
             expected[time, shown[pose]] += weight
     expected /= expected.sum(axis=1, keepdims=True)

@@ -71,7 +71,7 @@ class Reference:
     """
 
     def __init__(self, learner):
-        self.structure = oracle.Structure(2, RING.sources, 5, Fraction(1, 20), Fraction(1, 50))
+        self.structure = oracle.Structure(2, RING.sources, 5, Fraction(1, 20), Fraction(1, 50), Fraction(1, 20))
         self.looks, self.actions = [], []
         uncertain = learner.uncertain([])
         share = learner.believed([])[0].share

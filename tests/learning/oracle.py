@@ -27,6 +27,7 @@ class Structure:
     n_symbols: int
     slip: Fraction
     wrong: Fraction
+    slip_again: Fraction
 
     @cached_property
     def patterns(self) -> list[tuple[int, ...]]:
@@ -50,18 +51,23 @@ class Structure:
         return list(itertools.permutations(range(self.n_symbols), len(self.sources[0])))
 
     def probability(self, contents: Contents, looks: Sequence[Detection], actions: Sequence[int]) -> Fraction:
-        """p(looks | actions, contents), the pose at first being any."""
+        """p(looks | actions, contents), the pose at first being any.
+
+        An action that failed when it was last done fails more often.
+        """
         everywhere = self.arrangements
-        belief = {arrangement: Fraction(1, len(everywhere)) for arrangement in everywhere}
+        belief = {(arrangement, frozenset[int]()): Fraction(1, len(everywhere)) for arrangement in everywhere}
         for time, look in enumerate(looks):
             if time:
-                moved: defaultdict[Arrangement, Fraction] = defaultdict(Fraction)
-                for arrangement, weight in belief.items():
-                    moved[self.turned(arrangement, actions[time - 1])] += weight * (1 - self.slip)
-                    moved[arrangement] += weight * self.slip
+                action, moved = actions[time - 1], defaultdict[tuple[Arrangement, frozenset[int]], Fraction](Fraction)
+                for (arrangement, failed), weight in belief.items():
+                    slip = self.slip_again if action in failed else self.slip
+                    moved[self.turned(arrangement, action), failed - {action}] += weight * (1 - slip)
+                    moved[arrangement, failed | {action}] += weight * slip
                 belief = moved
             belief = {
-                arrangement: weight * self.look(contents, arrangement, look) for arrangement, weight in belief.items()
+                (arrangement, failed): weight * self.look(contents, arrangement, look)
+                for (arrangement, failed), weight in belief.items()
             }
         return sum(belief.values(), Fraction(0))
 

@@ -41,7 +41,7 @@ def test_each_trial_is_of_the_object_that_it_is_filed_under_or_of_a_new_one():
     trials = [trial_of(rings[owner], 8, rng) for owner in owners]
     candidate = Candidate(RING, RING_WORLD)
     candidate.catch_up(trials, owners, Rates(slip=0.05, wrong=0.02, repeat=1e-9))
-    exact = Structure(2, RING.sources, 5, Fraction(1, 20), Fraction(1, 50))
+    exact = Structure(2, RING.sources, 5, Fraction(1, 20), Fraction(1, 50), Fraction(1, 20))
     pairs = [(trial.detections, trial.actions) for trial in trials]
     for number, (pair, owner) in enumerate(zip(pairs, owners, strict=True)):
         earlier = [pairs[other] for other in range(number) if owners[other] == owner]
@@ -62,7 +62,7 @@ def test_where_all_objects_were_met_there_is_still_one_that_was_not():
 
 def test_events_and_occasions_count_as_far_as_a_trial_follows_the_structure():
     candidate = Candidate(RING, RING_WORLD)
-    candidate.events = np.array([[1.0, 2.0, 3.0, 4.0], [10.0, 20.0, 30.0, 40.0]])
+    candidate.events = np.array([[1.0, 2.0, 3.0, 4.0, 5.0, 6.0], [10.0, 20.0, 30.0, 40.0, 50.0, 60.0]])
     trials = [RawTrial(((0, 1),) * (n + 1), (0,) * n) for n in (4, 8)]
     tally = candidate.tally(trials, np.array([1.0, 0.5]))
-    assert tally == (6.0, 4 + 4, 12.0, 5 + 4.5, 18.0, 24.0)
+    assert tally == (6.0, 4 + 4, 30.0, 36.0, 12.0, 5 + 4.5, 18.0, 24.0)

@@ -7,10 +7,9 @@ import numpy as np
 import pytest
 
 from atg_fg.learning.candidate import Candidate
-from atg_fg.learning.kinds import MAX_KINDS, N_PLAIN, PLAIN_BEFORE, choose_kinds, kind_table, share_kinds
+from atg_fg.learning.kinds import MAX_KINDS, N_PLAIN, PLAIN_BEFORE, choose_kinds, kind_table, share_kinds, tally_events
 from atg_fg.learning.plain_evidence import USUAL, PlainEvidence
-from atg_fg.learning.pose_filter import SLIP, WRONG
-from atg_fg.learning.rates import Rates
+from atg_fg.learning.rates import AGAIN, FAILED, SLIP, WRONG, Rates
 from atg_fg.learning.raw_trials import RawTrial
 from atg_fg.learning.shared_structure import SharedStructure
 from tests.learning.worlds import ARCUBES, CUBE, PRISM, cubes, prisms, random_objects, trial_of
@@ -110,7 +109,7 @@ def pool_of(tables, structures, wrong=None):
     """Structures that explain trials of eleven looks as they are told to, none of them in another way."""
     pool = [Candidate(structure, ARCUBES) for structure in structures]
     for number, (each, log_evidence) in enumerate(zip(pool, tables, strict=True)):
-        each.log_evidence, each.events = np.tile(log_evidence, (3, 1)), np.zeros((len(log_evidence), 4))
+        each.log_evidence, each.events = np.tile(log_evidence, (3, 1)), np.zeros((len(log_evidence), FAILED))
         if wrong is not None:
             each.events[:, WRONG] = wrong[number]
     return pool, [RawTrial(((0, 1),) * 11, (0,) * 10)] * len(tables[0])
@@ -170,11 +169,23 @@ def test_of_structures_that_explain_nearly_as_much_the_best_are_believed_in():
 def test_wrong_looks_and_slips_beyond_a_limit_are_none_of_a_kind(rates, wrong, slips, is_one):
     """Of eleven looks 1.83 wrong ones and 2.6 of either, and three times what rates foretell beyond those beforehand.
 
-    Of one wrong look and five slips more in a hundred that is 0.33 and 1.83.
+    Of one wrong look and five slips more in a hundred that is 0.33 and 1.83. Slips after slips do not count.
     """
     ((kind,), trials), plain = pool_of([[-20.0]], wide(3)), np.array([[-25.0, -30.0]])
-    kind.events[0, [WRONG, SLIP]] = wrong, slips
+    kind.events[0, [WRONG, SLIP, AGAIN]] = wrong, slips + 4, 4
     assert kind_table([kind], plain, trials, rates)[0, N_PLAIN] == (-20.0 if is_one else -35.0)
+
+
+def test_events_are_those_of_the_set_and_of_its_commonest_structure_if_it_were_alone():
+    """Three trials follow the first structure, the fourth the second, or the first less probably."""
+    pool, trials = pool_of([[-20.0, -20.0, -20.0, -40.0], [-90.0, -90.0, -90.0, -20.0]], wide(3, 4))
+    for candidate, slips in zip(pool, (1.0, 2.0), strict=True):
+        candidate.events[:, SLIP] = slips
+    plain = np.full((4, 2), -60.0)
+    best = next(each for each in choose_kinds(pool, plain, trials, RATES) if each.structures == (0, 1))
+    together, alone = tally_events(best, pool, plain, trials, RATES)
+    assert (together.slips, together.n_actions) == pytest.approx((3 + 2, 40), abs=1e-6)
+    assert (alone.slips, alone.n_actions) == pytest.approx((4, 40), abs=1e-6)
 
 
 def test_what_few_trials_of_many_take_for_wrong_is_not_excused_by_the_others():

@@ -2,13 +2,15 @@
 
 import itertools
 import math
+from dataclasses import replace
 from fractions import Fraction
 
 import numpy as np
 import pytest
 
 from atg_fg.learning.likelihood import score_trials
-from atg_fg.learning.rates import Rates
+from atg_fg.learning.rates import AGAIN, FAILED_BEFORE, SLIP, Rates
+from atg_fg.learning.raw_trials import RawTrial
 from atg_fg.learning.shared_structure import SharedStructure
 from tests.learning import oracle
 from tests.learning.completions import exact_log_evidence
@@ -17,12 +19,14 @@ from tests.learning.worlds import ARCUBES, BOX, CUBE, DOUBLE, NEVER, RING, RING_
 ALPHABET = RING_WORLD.alphabet
 #: Slips and wrong looks as often as on a bad robot.
 OFTEN = Rates(slip=0.05, wrong=0.02, repeat=1e-12)
+#: Slips come together, too.
+TOGETHER = Rates(slip=0.05, slip_again=0.5, wrong=0.02, repeat=1e-12)
 ROTATION = SharedStructure(2, ((1, 2, 3, 0),))
 
 
 def oracle_of(structure, n_symbols, rates):
-    slip, wrong = (Fraction(str(rate)) for rate in (rates.slip, rates.wrong))
-    return oracle.Structure(structure.n_slots, structure.sources, n_symbols, slip, wrong)
+    slip, slip_again, wrong = (Fraction(str(rate)) for rate in (*rates.slips, rates.wrong))
+    return oracle.Structure(structure.n_slots, structure.sources, n_symbols, slip, wrong, slip_again)
 
 
 def trials_of(structure, n, seed, n_actions=5, **noise):
@@ -44,6 +48,34 @@ def test_objects_whose_contents_are_known_are_filtered_exactly(structure, missin
     ]
     np.testing.assert_allclose(scores.log_evidence, expected, rtol=0, atol=1e-7)
     np.testing.assert_allclose(scores.contents, known, atol=1e-12)
+
+
+@pytest.mark.parametrize("missing", [0.0, 0.3])
+@pytest.mark.parametrize("structure", [RING, BOX], ids=["ring", "box"])
+def test_how_far_off_the_mean_of_what_failed_before_is(structure, missing):
+    contents, trials = trials_of(structure, 40, seed=1, n_actions=8, slip=0.3, wrong=0.1, missing=missing)
+    scores = score_trials(structure, trials, TOGETHER, ALPHABET, np.eye(5)[np.array(contents)])
+    exact = oracle_of(structure, 5, TOGETHER)
+    errors = np.abs(
+        [
+            score - math.log(exact.probability(tuple(each), trial.detections, trial.actions))
+            for score, each, trial in zip(scores.log_evidence, contents, trials, strict=True)
+        ]
+    )
+    print(f"error of ln p(trial), missing {missing}: mean {errors.mean():.3f}, worst {errors.max():.3f} nats")
+    assert errors.max() < 0.3
+    assert errors.mean() < 0.02
+
+
+def test_an_action_that_fails_in_a_row_is_filtered_exactly():
+    """Looks are never wrong, so that which actions failed is known, and a fresh ring shows all it has."""
+    rates = Rates(slip=0.05, slip_again=0.5, wrong=1e-12, repeat=1e-12)
+    looks = ((0, 1), (0, 1), (0, 1), (1, 2), (1, 2), (2, 0))
+    trial = RawTrial(looks, (0, 0, 0, 1, 0))
+    turned = score_trials(RING, [trial], rates, ALPHABET)
+    exact = replace(oracle_of(RING, 5, rates), wrong=Fraction(0))
+    expected = math.log(exact.fresh(trial.detections, trial.actions))
+    assert turned.log_evidence[0] == pytest.approx(expected, abs=1e-7)
 
 
 def test_a_pose_that_shows_one_register_twice_explains_no_look():
@@ -151,11 +183,23 @@ def test_a_clean_trial_of_a_cube_reveals_its_tags():
 def test_slips_and_wrong_looks_are_counted():
     rng = np.random.default_rng(6)
     trials = [trial_of(each, 20, rng, slip=0.1, wrong=0.02) for each in cubes(30)]
-    slips, wrong, repeats, reveals = score_trials(CUBE, trials, Rates(), ARCUBES.alphabet).events.sum(axis=0)
+    events = score_trials(CUBE, trials, Rates(), ARCUBES.alphabet).events.sum(axis=0)
+    slips, wrong, repeats, reveals, again, n_failed_before = events
     assert slips == pytest.approx(60, abs=25)  # of 600 actions; the few that leave what is in view are not seen
     assert wrong == pytest.approx(12.6, abs=10)
     assert reveals == pytest.approx(180, abs=10)
     assert repeats < 10
+    assert again == pytest.approx(6, abs=6)  # a tenth of
+    assert n_failed_before == pytest.approx(56, abs=25)  # slips, but for the last ones of their action
+
+
+def test_slips_after_slips_are_counted():
+    """What is seen tells all: of six turns the first, second and fourth fail, and the last swap."""
+    looks = ((0, 1), (0, 1), (0, 1), (1, 2), (1, 2), (2, 1), (1, 0), (0, 2), (0, 2))
+    trial = RawTrial(looks, (0, 0, 0, 0, 1, 0, 0, 1))
+    rates = Rates(slip=0.05, slip_again=0.5, wrong=1e-12, repeat=1e-12)
+    (events,) = score_trials(RING, [trial], rates, ALPHABET, np.eye(5)[[[0, 1, 2]]]).events
+    assert (events[SLIP], events[AGAIN], events[FAILED_BEFORE]) == pytest.approx((4, 1, 3), abs=1e-6)
 
 
 def test_a_repeated_tag_is_held_for_less_probable_but_possible():

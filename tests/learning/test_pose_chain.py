@@ -2,23 +2,30 @@
 filter where contents are known."""
 
 import itertools
+import math
+from dataclasses import replace
+from fractions import Fraction
 
 import numpy as np
 import pytest
 
+from atg_fg.core.actions import UncertainAction
 from atg_fg.core.errors import InvalidInputError
 from atg_fg.core.patterns import Evidence
 from atg_fg.inference.chain import forward_pass
 from atg_fg.inference.factor_graph import RecognitionGraph
 from atg_fg.inference.history import History
-from atg_fg.learning.pose_chain import pose_chain
+from atg_fg.learning.pose_chain import MAX_STATES, pose_chain, repeated_actions
 from atg_fg.learning.pose_filter import PoseFilter
 from atg_fg.learning.rates import Rates
 from tests.learning.completions import completions
+from tests.learning.oracle import Structure
 from tests.learning.worlds import BOX, RING, RING_WORLD, objects_of, trial_of
 
 ALPHABET = RING_WORLD.alphabet
 OFTEN = Rates(slip=0.05, wrong=0.02, repeat=1e-12)
+#: An action that failed fails again.
+TOGETHER = replace(OFTEN, slip_again=0.6)
 CONTENTS = np.eye(5)[np.array([[0, 1, 2], [0, 2, 1], [3, 4, 0], [0, 1, 4]])]
 PRIOR = np.array([0.1, 0.2, 0.3, 0.4])
 
@@ -48,7 +55,7 @@ def enumerated(chain):
 @pytest.mark.parametrize(("seed", "missing"), [(0, 0.0), (1, 0.0), (2, 0.5)])
 def test_every_way_to_infer_agrees(seed, missing):
     history = history_of(seed, missing)
-    chain = pose_chain(RING.poses(), CONTENTS, PRIOR, OFTEN, ALPHABET, history)
+    chain = pose_chain(RING.poses(), CONTENTS, PRIOR, TOGETHER, ALPHABET, history)
     identity, marginals = enumerated(chain)
     graph = RecognitionGraph(chain, n_unseen=1)
     belief = graph.identity()
@@ -67,6 +74,7 @@ def test_the_filter_is_the_forward_pass_where_contents_are_known(seed, missing):
     chain = pose_chain(RING.poses(), CONTENTS, PRIOR, OFTEN, ALPHABET, history)
     own = PoseFilter(RING.poses(), CONTENTS, OFTEN, ALPHABET)
     forward = forward_pass(chain)
+    assert len(chain.initial[0]) == 6 * 4  # which of two actions failed
     for time, evidence in enumerate(history.evidence):
         if time:
             own.act(history.actions[time - 1])
@@ -78,7 +86,30 @@ def test_the_filter_is_the_forward_pass_where_contents_are_known(seed, missing):
         np.testing.assert_allclose(own.log_evidence, forward.log_joints[time] - np.log(PRIOR), rtol=0, atol=1e-6)
         filtered = np.zeros((len(CONTENTS), 6))
         filtered[own.rows.owner, own.rows.pose] = own.rows.weight
-        np.testing.assert_allclose(filtered, forward.filtered[time], rtol=0, atol=1e-6)
+        poses = forward.filtered[time].reshape(len(CONTENTS), 4, 6).sum(axis=1)
+        np.testing.assert_allclose(filtered, poses, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("structure", [RING, BOX], ids=["ring", "box"])
+@pytest.mark.parametrize("missing", [0.0, 0.4])
+def test_a_chain_is_the_sum_over_poses_and_which_actions_failed(structure, missing):
+    symbols = (0, 3, 1, 2)[: structure.n_registers]
+    exact = Structure(2, structure.sources, 5, Fraction(1, 20), Fraction(1, 50), Fraction(3, 5))
+    for seed in range(5):
+        rng = np.random.default_rng(seed)
+        trial = trial_of(*objects_of(structure, [symbols]), 7, rng, slip=0.4, wrong=0.1, missing=missing)
+        history = History([Evidence.of_detection(ALPHABET, look) for look in trial.detections], list(trial.actions))
+        chain = pose_chain(structure.poses(), np.eye(5)[[symbols]], np.ones(1), TOGETHER, ALPHABET, history)
+        expected = exact.probability(symbols, trial.detections, trial.actions)
+        assert forward_pass(chain).log_joint[0] == pytest.approx(math.log(expected), abs=1e-9)
+
+
+def test_actions_that_may_have_been_repeated_are_told_the_most_frequent_first():
+    actions = [2, 0, UncertainAction(((1, 0.5), (3, 0.5)), 0.0), 0, UncertainAction(((1, 0.3),), 0.7), 2, 0]
+    assert repeated_actions(actions, n_poses=24) == [0, 2, 1]
+    assert repeated_actions(actions, n_poses=MAX_STATES // 4) == [0, 2]
+    assert repeated_actions(actions, n_poses=MAX_STATES // 4 + 1) == [0]
+    assert repeated_actions([0, 1], n_poses=24) == []
 
 
 def test_a_new_object_in_the_graph_is_the_sum_over_all_it_may_contain():
@@ -96,7 +127,8 @@ def test_a_box_in_the_graph_may_be_open_at_first():
     chain = pose_chain(BOX.poses(), contents, np.full(120, 1 / 120), OFTEN, ALPHABET, history_of(5))
     graph = RecognitionGraph(chain, n_unseen=1)
     assert graph.log_evidence() == pytest.approx(np.logaddexp.reduce(forward_pass(chain).log_joint), abs=1e-12)
-    np.testing.assert_array_equal(chain.initial, 1 / 4)
+    np.testing.assert_array_equal(chain.initial[:, :4], 1 / 4)
+    np.testing.assert_array_equal(chain.initial[:, 4:], 0)
 
 
 def test_a_trial_without_a_look_has_no_chain():

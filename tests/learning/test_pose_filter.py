@@ -6,13 +6,13 @@ import pytest
 from atg_fg.core.actions import UncertainAction
 from atg_fg.learning.pose_chain import pose_patterns
 from atg_fg.learning.pose_filter import PoseFilter
-from atg_fg.learning.rates import Rates
+from atg_fg.learning.rates import FAILED, Rates
 from atg_fg.learning.raw_trials import side_by_side
 from atg_fg.learning.register_contents import symbol_probabilities
 from tests.learning.worlds import BOX, RING, RING_WORLD, objects_of, trial_of
 
 ALPHABET = RING_WORLD.alphabet
-OFTEN = Rates(slip=0.05, wrong=0.02, repeat=0.05)
+OFTEN = Rates(slip=0.05, slip_again=0.4, wrong=0.02, repeat=0.05)
 
 
 @pytest.mark.parametrize("structure", [RING, BOX], ids=["ring", "box"])
@@ -56,9 +56,11 @@ def test_predicted_patterns_are_sums_over_poses_and_slips(structure, last):
         now = sum(rows.weight[row] / total * shown[rows.table[row], rows.pose[row]] for row in own)
         np.testing.assert_allclose(shown_now[place], now, rtol=0, atol=1e-9)
         for action in range(2):
-            after = sum(
-                rows.weight[row] / total * shown[rows.table[row], poses.successors[rows.pose[row], action]]
-                for row in own
-            )
-            right = 0.95 * after + 0.05 * now
+            right = np.zeros(len(ALPHABET))
+            for row in own:
+                failed_before = rows.events[row, FAILED + action]
+                slip = 0.05 * (1 - failed_before) + 0.4 * failed_before
+                after = shown[rows.table[row], poses.successors[rows.pose[row], action]]
+                stayed = shown[rows.table[row], rows.pose[row]]
+                right += rows.weight[row] / total * ((1 - slip) * after + slip * stayed)
             np.testing.assert_allclose(predicted[action, place], 0.98 * right + 0.02 / len(ALPHABET), rtol=0, atol=1e-9)
