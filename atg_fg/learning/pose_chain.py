@@ -50,8 +50,8 @@ def pose_chain(
     """Return the chain of a trial: O is which of H objects it is, X_s the pose and which actions failed.
 
     State f · G + g is pose g of G, and bit k of f says whether the action at place k of ``repeated_actions`` failed
-    when it was last done. It is exact for objects whose contents are known. Registers that are not known count as drawn
-    anew at each look.
+    when it was last done; f is 0 throughout if that makes no difference. It is exact for objects whose contents are
+    known. Registers that are not known count as drawn anew at each look.
 
     Args:
         poses: Of the structure.
@@ -64,7 +64,7 @@ def pose_chain(
     if not history.evidence:
         raise InvalidInputError("trial: nothing observed yet; expected a first observation")
     n_objects, n_poses = len(contents), len(poses.registers)
-    repeated = repeated_actions(history.actions, n_poses)
+    repeated = [] if rates.slip_again is None else repeated_actions(history.actions, n_poses)
     n_states = n_poses * 2 ** len(repeated)
     shown = np.tile(pose_patterns(poses, contents, rates, alphabet), (1, n_states // n_poses, 1))
     turns = [_transition(poses, action, rates, repeated) for action in range(poses.successors.shape[1])]
