@@ -1,3 +1,4 @@
+import os
 from pathlib import Path
 
 import hypothesis
@@ -47,18 +48,33 @@ def pytest_configure(config):
     hypothesis.settings.load_profile("atg-fg")
 
 
+@pytest.hookimpl(wrapper=True)
+def pytest_make_collect_report(collector):
+    """Let every other worker collect from the end: no two of them then compile the same files where none is compiled yet."""
+    report = yield
+    if isinstance(collector, pytest.Directory) and os.environ.get("PYTEST_XDIST_WORKER", "")[-1:] in tuple("13579"):
+        report.result.reverse()
+    return report
+
+
 def pytest_collection_modifyitems(items):
-    """Put the files that take longest first."""
+    """Put the files that take longest first, and the others in their order."""
     places = {Path(__file__).parent / name: place for place, name in enumerate(LONGEST)}
     assert all(path.is_file() for path in places)
-    items.sort(key=lambda item: places.get(item.path, len(places)))
+    items.sort(key=lambda item: (places.get(item.path, len(places)), item.path))
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_pyfunc_call():
+    """Take the name of the test out of the environment: what forks workers for one test is then of use to the next."""
+    os.environ.pop("PYTEST_CURRENT_TEST", None)
 
 
 @pytest.fixture(scope="module")
-def dask_address(tmp_path_factory):
-    """A scheduler with two workers, which end with the file."""
+def dask_address(tmp_path_factory, request):
+    """A scheduler with two workers, which end with the file; in quick tests, with one of two threads."""
     pytest.importorskip("distributed")
-    folder = tmp_path_factory.mktemp("dask")
-    with dask_cluster.scheduler(folder) as (_, address), dask_cluster.workers(address, folder):
-        dask_cluster.wait_for(lambda: dask_cluster.n_workers(address) == 2)
+    folder, is_quick = tmp_path_factory.mktemp("dask"), "not slow" in request.config.option.markexpr
+    with dask_cluster.scheduler(folder) as (_, address), dask_cluster.workers(address, folder, threads=is_quick):
+        dask_cluster.wait_for_workers(address, 1 if is_quick else 2)
         yield address

@@ -41,10 +41,10 @@ def address_in(file):
 
 
 @contextmanager
-def workers(address, folder, number=2):
-    """Begin worker processes, each watched over by a nanny that begins it anew when it dies."""
-    options = ["--nworkers", number, "--nthreads", "1", "--no-dashboard", "--local-directory", folder]
-    options += ["--death-timeout", "60"]
+def workers(address, folder, number=2, *, threads=False):
+    """Begin worker processes, each watched over by a nanny that begins it anew when it dies; or threads of one."""
+    options = ["--nworkers", number, "--nthreads", "1"] if not threads else ["--no-nanny", "--nthreads", number]
+    options += ["--no-dashboard", "--local-directory", folder, "--death-timeout", "60"]
     process = begin("dask_worker", address.replace("dask://", "tcp://"), *options)
     try:
         yield process
@@ -53,12 +53,12 @@ def workers(address, folder, number=2):
         process.wait()
 
 
-def n_workers(address):
-    """Return how many workers a scheduler has."""
+def wait_for_workers(address, number):
+    """Wait until a scheduler has so many workers."""
     import distributed
 
     with distributed.Client(address.replace("dask://", "tcp://"), set_as_default=False) as client:
-        return len(client.scheduler_info()["workers"])
+        client.wait_for_workers(number, timeout=60)
 
 
 def wait_for(condition, seconds=60):

@@ -3,8 +3,6 @@
 import sys
 from pathlib import Path
 
-import jupytext
-import nbformat
 import pytest
 
 FOLDER = Path(__file__).parents[1] / "notebooks"
@@ -16,6 +14,14 @@ def execute():
     sys.path.insert(0, str(FOLDER))
     yield __import__("execute")
     sys.path.remove(str(FOLDER))
+
+
+def read(path):
+    """Return a notebook, or what is paired with it; the libraries take a second of each worker that collects this."""
+    import jupytext
+    import nbformat
+
+    return nbformat.read(path, as_version=4) if path.suffix == ".ipynb" else jupytext.read(path)
 
 
 def sources(notebook):
@@ -43,12 +49,12 @@ def test_a_notebook_runs_from_its_first_cell_to_its_last(path, execute):
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_a_notebook_and_its_script_say_the_same(path):
-    assert sources(jupytext.read(path.with_suffix(".py"))) == sources(nbformat.read(path, as_version=4))
+    assert sources(read(path.with_suffix(".py"))) == sources(read(path))
 
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_outputs_are_kept_and_none_is_an_error(path):
-    outputs = [output for cell in nbformat.read(path, as_version=4).cells for output in cell.get("outputs", [])]
+    outputs = [output for cell in read(path).cells for output in cell.get("outputs", [])]
     assert any("image/png" in output.get("data", {}) for output in outputs)
     assert {output.output_type for output in outputs} <= {"stream", "execute_result", "display_data"}
     assert not any(output.get("name") == "stderr" for output in outputs)
@@ -56,6 +62,6 @@ def test_outputs_are_kept_and_none_is_an_error(path):
 
 @pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
 def test_cells_are_short_and_need_no_file_of_a_checkout(path):
-    sources_of_code = [cell.source for cell in nbformat.read(path, as_version=4).cells if cell.cell_type == "code"]
+    sources_of_code = [cell.source for cell in read(path).cells if cell.cell_type == "code"]
     assert max(len(source.splitlines()) for source in sources_of_code) < 20
     assert not any("../" in source for source in sources_of_code)

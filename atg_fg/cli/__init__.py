@@ -5,7 +5,6 @@ from __future__ import annotations
 import errno
 import os
 import sys
-from importlib.metadata import entry_points
 from io import TextIOWrapper
 from typing import Annotated, Any, Final
 
@@ -14,6 +13,7 @@ import typer.exceptions
 
 from atg_fg.cli.lazy_commands import LazyCommand, LazyGroup
 from atg_fg.core.errors import AtgError, InvalidInputError
+from atg_fg.core.plugins import registered
 from atg_fg.core.version import __version__
 from atg_fg.core.visible_text import visible
 from atg_fg.inference.kernels.compilation import tell_of_compilation
@@ -74,7 +74,7 @@ class _Commands(LazyGroup):
         for panel, places in COMMANDS.items():
             for name, place in places.items():
                 self.add_command(LazyCommand(name, place, panel, BEFORE.get(name)))
-        for entry in entry_points(group="atg_fg.commands"):
+        for entry in registered("atg_fg.commands").values():
             self.add_command(LazyCommand(entry.name, entry.value, OFFERED.get(entry.name, "More")))
 
     def get_command(self, ctx: Any, cmd_name: str) -> Any:

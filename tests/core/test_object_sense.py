@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from scipy import stats
 
 from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.assumptions import Assumptions
@@ -17,6 +16,7 @@ from atg_fg.core.memory import RobotMemory
 from atg_fg.core.object_sense import Moments, ObjectSense
 from atg_fg.core.patterns import PatternAlphabet
 from atg_fg.learning.structured_memory import StructuredMemory
+from tests.normal import log_density
 
 WEIGHT = ObjectSense("weight", 0.5, 0.6, 0.08, unit="kg", revealed_by=("flip",))
 LENGTH = ObjectSense("length", 2.0, 1.0, 0.5, unit="m", relative=False)
@@ -39,10 +39,9 @@ def test_readings_one_after_the_other_are_their_joint_density(readings: list[flo
     for number, value in enumerate(values):
         before = WEIGHT.moments_of(readings[:number])
         mean, variance = WEIGHT.next_reading(np.array([float(before.count)]), np.array([before.total]), 0.08**2)
-        total += float(stats.norm(mean[0], math.sqrt(variance[0])).logpdf(value))
+        total += log_density([value], mean[0], variance.reshape(1, 1))
     covariance = 0.6**2 * np.ones((len(values),) * 2) + 0.08**2 * np.eye(len(values))
-    joint = stats.multivariate_normal(np.full(len(values), math.log(0.5)), covariance).logpdf(values)
-    assert total == pytest.approx(float(joint), rel=1e-7, abs=1e-7)
+    assert total == pytest.approx(log_density(values, math.log(0.5), covariance), rel=1e-7, abs=1e-7)
 
 
 def test_an_error_that_is_learned_goes_from_what_was_stated_to_what_readings_scatter() -> None:

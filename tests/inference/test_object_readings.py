@@ -8,7 +8,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from scipy import integrate, stats
+from scipy import integrate
 
 from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.assumptions import Assumptions
@@ -21,6 +21,7 @@ from atg_fg.engines import begin_trial
 from atg_fg.inference.explanations import best_explanations, sample_explanations, surprise
 from atg_fg.inference.factor_graph import RecognitionGraph
 from atg_fg.inference.joint_factor_graph import JointRecognitionGraph
+from tests.normal import log_density
 from tests.small import EXACT_ENGINES, each_of
 
 ABLE = [name for name in EXACT_ENGINES if name != "large-memory"]
@@ -54,7 +55,7 @@ def next_density(readings: Sequence[float], reading: float, sense: ObjectSense =
         if not points:
             return 1.0
         cov = sense.spread**2 * np.ones((len(points),) * 2) + sense.error**2 * np.eye(len(points))
-        return float(stats.multivariate_normal(np.full(len(points), m0), cov).pdf(points))
+        return math.exp(log_density(points, m0, cov))
 
     return joint(values) / joint(values[:-1])
 

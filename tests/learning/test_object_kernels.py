@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy import stats
 
 from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.assumptions import Assumptions
@@ -17,17 +16,15 @@ from atg_fg.learning.duplicates import find_duplicates
 from atg_fg.learning.raw_trials import RawTrial, Recording
 from atg_fg.learning.structured_memory import StructuredMemory
 from tests.learning.test_kernels import chain_of, drawn_trials
+from tests.normal import log_density
 
 LENGTH = ObjectSense("length", 2.0, 1.0, 0.5, relative=False)
 READINGS = [[1.0, 1.2], [1.1], [3.0], [], [0.9, 1.0, 1.1]]
 
 
-def log_density(readings: list[float]) -> float:
+def log_evidence(readings: list[float]) -> float:
     """ln p(readings | one object)."""
-    if not readings:
-        return 0.0
-    covariance = np.ones((len(readings),) * 2) + 0.25 * np.eye(len(readings))
-    return float(stats.multivariate_normal(np.full(len(readings), 2.0), covariance).logpdf(readings))
+    return log_density(readings, 2.0, np.ones((len(readings),) * 2) + 0.25 * np.eye(len(readings))) if readings else 0.0
 
 
 def felt_trials(n_trials=5):
@@ -41,7 +38,7 @@ def test_a_cluster_weighs_what_its_readings_say_of_those_of_a_trial():
     chain, _ = chain_of(trials, [0, 0, 1, 1, -1], [0, 0, 0, 0, 0])
     found = object_kernels.cluster_weights(trials, 4, chain.clusters, 2, 0.7)
     of_clusters = [[*READINGS[0], *READINGS[1]], READINGS[2], []]
-    expected = np.array([log_density([*each, *READINGS[4]]) - log_density(each) for each in of_clusters])
+    expected = np.array([log_evidence([*each, *READINGS[4]]) - log_evidence(each) for each in of_clusters])
     expected[2] += 0.7
     np.testing.assert_allclose(found[:3] - found[0], expected - expected[0], atol=1e-10)
     # A trial in which nothing was felt says nothing.
@@ -57,7 +54,7 @@ def test_evidence_of_a_partition_is_the_joint_density_up_to_a_constant():
         groups = [
             [value for each, own in zip(READINGS, owner, strict=True) if own == k for value in each] for k in range(5)
         ]
-        differences.append(object_kernels.log_felt(trials, chain.clusters) - sum(map(log_density, groups)))
+        differences.append(object_kernels.log_felt(trials, chain.clusters) - sum(map(log_evidence, groups)))
     assert differences == pytest.approx([differences[0]] * 3, abs=1e-10)
 
 

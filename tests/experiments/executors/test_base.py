@@ -152,7 +152,7 @@ class TestCluster:
     def test_a_scheduler_that_dies_is_one_clear_error(self, tmp_path, capfd):
         pytest.importorskip("distributed")
         with dask_cluster.scheduler(tmp_path) as (process, address), dask_cluster.workers(address, tmp_path, 1):
-            dask_cluster.wait_for(lambda: dask_cluster.n_workers(address) == 1)
+            dask_cluster.wait_for_workers(address, 1)
             capfd.readouterr()
             with ThreadPoolExecutor(1) as pool:
                 pool.submit(kill_when_begun, process, tmp_path)
