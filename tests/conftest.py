@@ -50,7 +50,7 @@ def pytest_configure(config):
 
 @pytest.hookimpl(wrapper=True)
 def pytest_make_collect_report(collector):
-    """Let every other worker collect from the end: no two of them then compile the same files where none is compiled yet."""
+    """Let every other worker collect from the end: no two then compile the same files where none is compiled yet."""
     report = yield
     if isinstance(collector, pytest.Directory) and os.environ.get("PYTEST_XDIST_WORKER", "")[-1:] in tuple("13579"):
         report.result.reverse()

@@ -24,6 +24,7 @@ def interrupted_spawning(request, monkeypatch):
 
     That is the server that forks workers, or a worker where there can be no server.
     """
+    fork_server._stop_idle()  # another test may have left one
     if request.param == "spawned":
         monkeypatch.setattr(fork_server, "is_possible", lambda: False)
     elif not fork_server.is_possible():
