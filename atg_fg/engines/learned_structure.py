@@ -30,7 +30,7 @@ from atg_fg.inference.interface import TrialSetup
 from atg_fg.inference.recognition_model import COLLECTION, RecognitionModel
 from atg_fg.learning.believed_structure import BelievedStructure
 from atg_fg.learning.object_kinds import PLAIN_WORDS
-from atg_fg.learning.pose_belief_tree import Following, StructureBelief
+from atg_fg.learning.pose_belief_tree import FilteredBelief, Following, StructureBelief
 from atg_fg.learning.rates import Rates
 from atg_fg.learning.raw_trials import RawTrial
 from atg_fg.learning.structured_memory import StructuredMemory
@@ -300,9 +300,10 @@ class LearnedStructure(BayesFilter):
         self._check_looked("belief tree")
         beliefs = self._type_beliefs()
         following = [Following(each.filter, belief) for each, belief in zip(self._followed, beliefs[1:], strict=True)]
-        return StructureBelief(
-            self.model, self._plain_aspects(beliefs), following, self.memory.assumptions.alphabet.symbols
-        )
+        symbols = self.memory.assumptions.alphabet.symbols
+        if self._compiled is not None:
+            return FilteredBelief(self.model, self._compiled, beliefs[0], following, symbols)
+        return StructureBelief(self.model, self._plain_aspects(beliefs), following, symbols)
 
     def compute_expected_entropies(self) -> FloatArray:
         """Return eq. 3 for each action, shape [A], from p(O, z | a) summed over types, poses and contents."""

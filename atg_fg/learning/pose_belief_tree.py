@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
@@ -24,6 +24,9 @@ from atg_fg.inference.recognition_model import RecognitionModel
 from atg_fg.learning.path_filter import PathFilter
 from atg_fg.learning.plain_filter import PlainFilter
 from atg_fg.learning.pose_filter import UNIMPORTANT, PoseFilter
+
+if TYPE_CHECKING:
+    from atg_fg.inference.kernels.compiled_filter import CompiledFilter
 
 
 class Following(NamedTuple):
@@ -53,10 +56,20 @@ class StructureBelief:
     ) -> None:
         self.model, self.plain, self.following, self.symbols = model, plain, following, symbols
 
+    @property
+    def _plain_identity(self) -> FloatArray:
+        """p(O, plain), shape [H]."""
+        total: FloatArray = self.plain.sum(axis=1)
+        return total
+
+    def _plain_joint(self, hypotheses: IntArray) -> FloatArray:
+        """Return p(O = i, plain, z | a) for the next look, shape [A, I, |𝒵|]."""
+        return pattern_table(self.model, next_pattern_joint(self.model, self.plain), hypotheses)
+
     @cached_property
     def identity(self) -> FloatArray:
         """p(O), shape [H]."""
-        total: FloatArray = self.plain.sum(axis=1)
+        total = self._plain_identity
         return total + sum((each.belief for each in self.following), np.zeros(len(total)))
 
     @cached_property
@@ -70,9 +83,10 @@ class StructureBelief:
     def joint(self) -> FloatArray:
         """J = p(O = i, z | a) for the next look, shape [A, I, |𝒵|], of objects that matter and last of *unseen*."""
         model, matters = self.model, self._matters
-        table = np.zeros((model.n_actions, len(matters), model.n_patterns))
-        if self.plain.sum() > UNIMPORTANT:
-            table += pattern_table(model, next_pattern_joint(model, self.plain), matters)
+        if self._plain_identity.sum() > UNIMPORTANT:
+            table = self._plain_joint(matters)
+        else:
+            table = np.zeros((model.n_actions, len(matters), model.n_patterns))
         place = np.full(model.n_hypotheses, -1)
         place[matters] = np.arange(len(matters))
         for each in self.following:
@@ -91,6 +105,41 @@ class StructureBelief:
     def after(self, action: int) -> StructureLooks:
         """Return what may be seen after an action."""
         return StructureLooks(self, action)
+
+
+class FilteredBelief(StructureBelief):
+    """The belief at present in a trial whose plain ATGs a compiled filter follows, which says what may be seen next.
+
+    Args:
+        model: The tables in force for plain ATGs.
+        own: Their filter.
+        belief: p(O, plain), shape [H].
+        following: Of each structure.
+        symbols: Symbols of every pattern, shape [|𝒵|, J].
+    """
+
+    def __init__(
+        self,
+        model: RecognitionModel,
+        own: CompiledFilter,
+        belief: FloatArray,
+        following: Sequence[Following],
+        symbols: IntArray,
+    ) -> None:
+        self.model, self.following, self.symbols = model, following, symbols
+        self._own, self._belief = own, belief
+
+    @cached_property
+    def plain(self) -> FloatArray:  # type: ignore[override]
+        """p(O, X_t, plain), shape [H, W]: asked for only by what looks further ahead."""
+        return self._belief[:, None] * self._own.state()[1]
+
+    @property
+    def _plain_identity(self) -> FloatArray:
+        return self._belief
+
+    def _plain_joint(self, hypotheses: IntArray) -> FloatArray:
+        return self._own.next_patterns(self._belief, hypotheses)
 
 
 class StructureLooks:

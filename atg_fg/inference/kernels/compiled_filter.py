@@ -11,7 +11,7 @@ from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.log_math import log_of, log_sum_exp
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
-from atg_fg.core.patterns import FloatArray
+from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.inference.kernels import belief_kernels as kernels
 from atg_fg.inference.kernels import decision_kernels
 from atg_fg.inference.kernels.memory_tables import ROOM, TrialArrays, arrays_for_trial, with_more_room
@@ -91,6 +91,14 @@ class CompiledRows:
         if learned[2] >= 0 and log_probability > -math.inf:
             self._shown_pattern = learned[2]
         return log_probability
+
+    def next_patterns(self, weights: FloatArray, hypotheses: IntArray) -> FloatArray:
+        """Return p(O = i, z | a) of the next look, shape [A, I, |𝒵|], of some hypotheses [I] with p(O) as given [H]."""
+        self._move()
+        result: FloatArray = decision_kernels.next_patterns(
+            self._arrays, self._constants, self._aspects, weights, hypotheses, self._n_actions
+        )
+        return result
 
     def _make_room(self) -> None:
         """Move rows apart, twice as far as before."""

@@ -208,3 +208,48 @@ def expected_entropies(
     for action in range(n_actions):
         entropy = _sum_x_log_x(predictive[action]) - expected[action]
         expected[action] = max(entropy + identity[len(identity) - 1] * log_n_unseen, 0.0)
+
+
+@compiled
+def next_patterns(
+    tables: tuple[Any, ...],
+    constants: tuple[Any, ...],
+    aspects: FloatArray,
+    weights: FloatArray,
+    hypotheses: IntArray,
+    n_actions: int,
+) -> FloatArray:
+    """Return J = p(O = i, z | a) of every pattern, shape [A, I, |𝒵|].
+
+    Args:
+        tables: ``Tables``.
+        constants: ``Constants``.
+        aspects: p(X_t | O, z_0:t), shape [H, W].
+        weights: p(O | z_0:t), shape [H].
+        hypotheses: Those in question, shape [I].
+        n_actions: A.
+    """
+    n_known, pattern, begins, edges, _, edge_probability = tables
+    n_aspects, n_patterns, _, delta = constants
+    observed = 1.0 - delta
+    result = np.empty((n_actions, len(hypotheses), n_patterns))
+    for number in range(len(hypotheses)):
+        hypothesis = hypotheses[number]
+        weight, n_own = weights[hypothesis], n_known[hypothesis]
+        noise = delta / n_patterns * weight
+        rate = 0.0
+        if n_own < n_aspects:
+            rate = (n_aspects - n_own) / n_aspects * (observed / (n_patterns - n_own))
+        for action in range(n_actions):
+            left = 1.0
+            for edge in range(begins[hypothesis, action], begins[hypothesis, action + 1]):
+                left -= aspects[hypothesis, edges[edge, 1]] * edge_probability[edge]
+            kept = max(left, 0.0) * weight
+            for each in range(n_patterns):
+                result[action, number, each] = kept * rate + noise
+            for state in range(1, n_own + 1):
+                result[action, number, pattern[hypothesis, state]] = kept * (observed / n_aspects) + noise
+            for edge in range(begins[hypothesis, action], begins[hypothesis, action + 1]):
+                arrived = aspects[hypothesis, edges[edge, 1]] * edge_probability[edge]
+                result[action, number, pattern[hypothesis, edges[edge, 0]]] += observed * weight * arrived
+    return result

@@ -17,6 +17,7 @@ from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, PatternAlphabet
 from atg_fg.engines import begin_trial
+from atg_fg.inference.expected_entropy import next_pattern_joint, pattern_table
 from atg_fg.inference.interface import Inference
 from atg_fg.inference.kernels import compilation
 from tests.models import cases
@@ -49,6 +50,10 @@ def assert_same(pair: tuple[Inference, Inference]) -> None:
     if not plain.history.awaits_evidence:
         expected = plain.expected_entropies()
         np.testing.assert_allclose(compiled.expected_entropies(), expected, rtol=0, atol=1e-12)
+        everyone = np.arange(plain.model.n_hypotheses)[::-1].copy()
+        table = pattern_table(plain.model, next_pattern_joint(plain.model, plain.aspect_belief), everyone)
+        looks = compiled._compiled.next_patterns(compiled.identity().probabilities, everyone)
+        np.testing.assert_allclose(looks, table, rtol=0, atol=1e-12)
 
 
 def observed(inference: Inference, evidence: Evidence) -> bool:
