@@ -169,8 +169,8 @@ FAULTS = [
     Fault(
         "kinds: all are as probable beforehand",
         "learning/kinds.py",
-        "before = np.array([*PLAIN_BEFORE, *[1.0] * (table.shape[1] - N_PLAIN)])",
-        "before = np.ones(table.shape[1])",
+        "return np.array([*PLAIN_BEFORE, *[1.0] * (table.shape[1] - N_PLAIN)])",
+        "return np.ones(table.shape[1])",
     ),
     Fault(
         "kinds: a trial with too many errors is one of the kind",

@@ -9,6 +9,7 @@ import math
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.inference.kernels.belief_kernels import BEGIN, step
@@ -98,3 +99,29 @@ def share_out(table: FloatArray, before: FloatArray, n_rounds: int) -> tuple[Flo
                 bound += share * (table[row, kind] - np.log(share))
         bound += math.lgamma(before[kind] + members) - math.lgamma(before[kind])
     return following, shares, bound
+
+
+@compiled
+def evidence_of_sets(table: FloatArray, before: FloatArray, members: NDArray[np.bool_], n_rounds: int) -> FloatArray:
+    """Return the bound of the log evidence that ``share_out`` gives of some of the kinds alone, shape [M].
+
+    Args:
+        table: ln p(row | kind), shape [n, K].
+        before: Concentration of each kind, shape [K].
+        members: Which kinds there are, shape [M, K].
+        n_rounds: In which the shares are estimated.
+    """
+    result = np.empty(len(members))
+    for number in range(len(members)):
+        kinds, n_kinds = np.empty(len(before), np.int64), 0
+        for kind in range(len(before)):
+            if members[number, kind]:
+                kinds[n_kinds] = kind
+                n_kinds += 1
+        own, concentration = np.empty((len(table), n_kinds)), np.empty(n_kinds)
+        for place in range(n_kinds):
+            concentration[place] = before[kinds[place]]
+            for row in range(len(table)):
+                own[row, place] = table[row, kinds[place]]
+        result[number] = share_out(own, concentration, n_rounds)[2]
+    return result

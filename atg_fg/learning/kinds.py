@@ -6,7 +6,8 @@ structures are compared by their evidence of all trials, each given those before
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import itertools
+from collections.abc import Iterable, Sequence
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -64,7 +65,7 @@ class KindSet(NamedTuple):
 
     Attributes:
         structures: Positions in the pool, ascending.
-        log_evidence: Of all trials, the prior of the structures included; −∞ if one of them is no kind.
+        log_evidence: Of all trials, the prior of the structures included.
         trials: Which kind each trial is of.
     """
 
@@ -104,8 +105,31 @@ def share_kinds(table: FloatArray) -> KindShares:
     """Return which kind each row is of, given ln p(row | kind), shape [n, 2 + K]."""
     from atg_fg.learning import kind_kernels  # they load Numba
 
-    before = np.array([*PLAIN_BEFORE, *[1.0] * (table.shape[1] - N_PLAIN)])
-    return KindShares(*kind_kernels.share_out(np.ascontiguousarray(table), before, _ROUNDS))
+    return KindShares(*kind_kernels.share_out(np.ascontiguousarray(table), _before(table), _ROUNDS))
+
+
+def _before(table: FloatArray) -> FloatArray:
+    """Return the Dirichlet concentration of each column."""
+    return np.array([*PLAIN_BEFORE, *[1.0] * (table.shape[1] - N_PLAIN)])
+
+
+def evidence_of_sets(table: FloatArray, sets: Sequence[Iterable[int]]) -> list[float]:
+    """Return ln p(all rows) of each set of structures, as ``share_kinds`` does of all, given ln p(row | kind)."""
+    from atg_fg.learning import kind_kernels  # they load Numba
+
+    members = np.zeros((len(sets), table.shape[1]), dtype=np.bool_)
+    members[:, :N_PLAIN] = True
+    for number, kinds in enumerate(sets):
+        for kind in kinds:
+            members[number, N_PLAIN + kind] = True
+    result: list[float] = kind_kernels.evidence_of_sets(table, _before(table), members, _ROUNDS).tolist()
+    return result
+
+
+def evidence_alone(pool: Sequence[Candidate], table: FloatArray, numbers: Sequence[int]) -> dict[int, float]:
+    """Return ln p(all trials) of some structures of a pool, each the only one, its prior included."""
+    evidence = evidence_of_sets(table, [[number] for number in numbers])
+    return {number: of + pool[number].structure.log_prior for number, of in zip(numbers, evidence, strict=True)}
 
 
 def choose_kinds(
@@ -124,28 +148,32 @@ def choose_kinds(
     """
     table = kind_table(pool, plain, trials, rates)
     n_looks = np.array([len(trial.detections) for trial in trials])
-    known: dict[frozenset[int], KindSet] = {}
+    known: dict[frozenset[int], float] = {}
+    made: dict[frozenset[int], KindSet | None] = {}
 
-    def of(kinds: frozenset[int]) -> KindSet:
-        if kinds not in known:
+    def of(kinds: frozenset[int]) -> KindSet | None:
+        if kinds not in made:
             chosen = tuple(sorted(kinds))
             shares = share_kinds(table[:, [SURE_KIND, UNCERTAIN_KIND, *(N_PLAIN + number for number in chosen)]])
-            evidence = shares.log_evidence + sum(pool[number].structure.log_prior for number in chosen)
-            following = shares.responsibilities[:, N_PLAIN:].T
-            if not all(_is_kind(pool[number], own, n_looks) for number, own in zip(chosen, following, strict=True)):
-                evidence = -np.inf
-            known[kinds] = KindSet(chosen, evidence, shares)
-        return known[kinds]
+            following = zip(chosen, shares.responsibilities[:, N_PLAIN:].T, strict=True)
+            are_kinds = all(_is_kind(pool[number], own, n_looks) for number, own in following)
+            made[kinds] = KindSet(chosen, known[kinds], shares) if are_kinds else None
+        return made[kinds]
 
-    best = of(frozenset())
+    best, neighbours = None, [frozenset[int]()]
     while True:
-        neighbours = [of(kinds) for kinds in _changes(frozenset(best.structures), len(pool))]
-        better = max(neighbours, key=lambda each: each.log_evidence, default=best)
-        if not better.log_evidence > best.log_evidence + 1e-6:
+        new = [kinds for kinds in neighbours if kinds not in known]
+        for kinds, evidence in zip(new, evidence_of_sets(table, new), strict=True):
+            known[kinds] = evidence + sum(pool[number].structure.log_prior for number in sorted(kinds))
+        neighbours.sort(key=lambda kinds: -known[kinds])
+        least = -np.inf if best is None else best.log_evidence + 1e-6
+        better = next((each for kinds in neighbours if known[kinds] > least and (each := of(kinds))), None)
+        if better is None:
             break
-        best = better
-    rivals = sorted(neighbours, key=lambda each: -each.log_evidence)[: MAX_BELIEVED - 1]
-    return [best, *(each for each in rivals if each.log_evidence > best.log_evidence - BELIEVED_WITHIN)]
+        best, neighbours = better, _changes(frozenset(better.structures), len(pool))
+    assert best is not None
+    near = (kinds for kinds in neighbours if known[kinds] > best.log_evidence - BELIEVED_WITHIN)
+    return [best, *itertools.islice(filter(None, map(of, near)), MAX_BELIEVED - 1)]
 
 
 def tally_events(

@@ -18,7 +18,16 @@ from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.patterns import MISSING, FloatArray
 from atg_fg.learning.believed_structure import BelievedStructure, UncertainObjects
 from atg_fg.learning.candidate import Candidate
-from atg_fg.learning.kinds import N_PLAIN, UNCERTAIN_KIND, KindSet, choose_kinds, kind_table, share_kinds, tally_events
+from atg_fg.learning.kinds import (
+    N_PLAIN,
+    UNCERTAIN_KIND,
+    KindSet,
+    choose_kinds,
+    evidence_alone,
+    kind_table,
+    share_kinds,
+    tally_events,
+)
 from atg_fg.learning.likelihood import FILED, NEW
 from atg_fg.learning.milestones import is_milestone
 from atg_fg.learning.plain_evidence import USUAL, PlainEvidence, PlainNoise
@@ -334,14 +343,10 @@ class StructureLearner:
         """Choose the sets of kinds, and keep their structures and those that are best beside them."""
         self._choose()
         kept = list(dict.fromkeys(number for each in self._sets for number in each.structures))
-        plain = self._of_plain()
+        plain, others = self._of_plain(), [number for number in range(len(self._candidates)) if number not in kept]
         nothing = share_kinds(plain).log_evidence
         table = kind_table(self._candidates, plain, self.trials, self.rates)
-        alone = {}
-        for number, each in enumerate(self._candidates):
-            if number not in kept:
-                of = share_kinds(table[:, [*range(N_PLAIN), N_PLAIN + number]])
-                alone[number] = of.log_evidence + each.structure.log_prior
+        alone = evidence_alone(self._candidates, table, others)
         spare = sorted(
             (number for number in alone if alone[number] > nothing - KEPT_WITHIN), key=lambda number: -alone[number]
         )

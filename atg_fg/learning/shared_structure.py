@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from operator import itemgetter
 from typing import TYPE_CHECKING, Final, NamedTuple
 
@@ -123,7 +123,7 @@ class SharedStructure:
         sources = self.sources[mode * self.n_actions + action]
         return (self.next_modes[mode][action] if self.next_modes else 0), sources
 
-    @property
+    @cached_property
     def log_prior(self) -> float:
         """The prior ln p(S), by any names of modes and hidden registers.
 
