@@ -93,6 +93,7 @@ def test_a_piece_that_kills_each_worker_is_given_up(mortal, tmp_path):
     assert pieces.times_begun(tmp_path, 1) == (3 if mortal == "process" else 4)
 
 
+@pytest.mark.usefixtures("server_loads_little")
 def test_processes_have_one_thread_for_linear_algebra_unless_the_user_says_otherwise(monkeypatch):
     monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
     monkeypatch.setenv("MKL_NUM_THREADS", "3")

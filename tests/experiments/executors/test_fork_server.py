@@ -32,6 +32,7 @@ def test_one_serves_all_campaigns_of_a_process():
     assert server_of_workers() == server_of_workers()
 
 
+@pytest.mark.usefixtures("server_loads_little")
 @pytest.mark.parametrize("change", ["environment", "path"])
 def test_another_one_is_begun_where_it_would_load_something_else(change, monkeypatch, tmp_path):
     before = server_of_workers()
@@ -44,6 +45,7 @@ def test_another_one_is_begun_where_it_would_load_something_else(change, monkeyp
         os.kill(before, 0)
 
 
+@pytest.mark.usefixtures("server_loads_little")
 def test_workers_have_the_environment_of_who_began_them(monkeypatch):
     monkeypatch.setenv("PYTHONPATH", "/somewhere")
     monkeypatch.delenv("PYTHONSAFEPATH", raising=False)
@@ -69,6 +71,7 @@ def test_there_is_none_where_its_libraries_may_have_threads(threads, monkeypatch
     assert run_pieces(pieces.parent, range(2), jobs=2) == [os.getpid()] * 2
 
 
+@pytest.mark.usefixtures("server_loads_little")
 def test_one_that_is_killed_costs_its_workers_pieces_and_another_is_begun(tmp_path):
     work = [(str(tmp_path), number) for number in range(3)]
     assert run_pieces(pieces.its_server_dies_once, work, jobs=2) == [0, 1, 2]
@@ -84,6 +87,7 @@ def refuse(_server, _descriptors):
     raise ConnectionRefusedError
 
 
+@pytest.mark.usefixtures("server_loads_little")
 class TestCtrlCWhileItLoads:
     """Whoever waits for a worker waits for the server, which may compile loops for a minute."""
 

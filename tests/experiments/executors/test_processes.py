@@ -19,12 +19,11 @@ pytestmark = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 
 
 @pytest.fixture(params=["server", "spawned"])
-def interrupted_spawning(request, monkeypatch):
+def interrupted_spawning(request, monkeypatch, server_loads_little):
     """Let Ctrl-C come when a process has been begun and told nothing yet, to whichever thread takes it.
 
     That is the server that forks workers, or a worker where there can be no server.
     """
-    fork_server._stop_idle()  # another test may have left one
     if request.param == "spawned":
         monkeypatch.setattr(fork_server, "is_possible", lambda: False)
     elif not fork_server.is_possible():
