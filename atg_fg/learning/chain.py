@@ -246,7 +246,7 @@ class Chain:
         order = self._order(rng)
         if thorough:
             for trial in order[:-1][:TOGGLED_TRIALS].tolist():
-                slip_kernels.slip_moves(trials, trial, self.clusters, done[trial], log_odds, task.log_new, 1, rng)
+                slip_kernels.slip_moves(trials, trial, self.clusters, done[trial], log_odds, task.log_new, rng)
         votes = np.zeros(len(self.clusters.n_trials) + 1)
         last = int(order[-1])
         given = last, self.clusters, done[last], log_odds, task.log_new
@@ -333,7 +333,8 @@ class Chain:
         free, n_objects = gibbs_kernels.take_out(trials, last, self.clusters, path)
         weights = np.full((len(self.clusters.n_trials), self.n_states), -np.inf)
         log_new, log_own = float(task.log_new[n_objects]), self._log_own(task)
-        weight_kernels.trial_weights(trials, last, self.clusters, free, log_new, weights)
+        prior = object_kernels.cluster_weights(trials, last, self.clusters, free, log_new)
+        weight_kernels.trial_weights(trials, last, self.clusters, free, prior, weights)
         total = log_sum_exp(weights.ravel()) - np.log(self.n_states)
         if len(log_own):
             share = gibbs_kernels.sharing(self.clusters)

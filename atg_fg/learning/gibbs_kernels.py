@@ -85,13 +85,13 @@ def trial_move(
     # One row more: a new object with an automaton of its own.
     n_states = len(clusters.registers)
     weights = np.full((len(clusters.n_trials) + 1, n_states), -np.inf)
-    trial_weights(trials, trial, clusters, free, log_new[n_clusters], weights[:-1])
+    prior = cluster_weights(trials, trial, clusters, free, log_new[n_clusters])
+    trial_weights(trials, trial, clusters, free, prior, weights[:-1])
     if len(log_own) > 0:
         share = sharing(clusters)
         for start in range(n_states):
             weights[free, start] += np.log(share)
-        prior = cluster_weights(trials, trial, clusters, free, log_new[n_clusters])[free]
-        weights[-1, 0] = prior + np.log(1.0 - share) + log_own[trial] + np.log(n_states)
+        weights[-1, 0] = prior[free] + np.log(1.0 - share) + log_own[trial] + np.log(n_states)
     if len(votes) > 0:
         count_votes(weights, free, votes)
     drawn = draw_by_logarithm(weights.ravel(), beta, rng)

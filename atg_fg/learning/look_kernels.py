@@ -121,8 +121,8 @@ def judged_move(
     if owner >= 0 and clusters.n_trials[owner] == 0:
         owner = free  # the first of an object is that of a new one
     weights = np.empty((len(clusters.n_trials), n_states))
-    trial_weights(each_slot, trial, clusters, free, log_new[n_clusters], weights)
     prior = cluster_weights(each_slot, trial, clusters, free, log_new[n_clusters])
+    trial_weights(each_slot, trial, clusters, free, prior, weights)
     least = weights.max() - _MARGIN
     if owner >= 0:
         least = min(least, weights[owner, start])
@@ -191,8 +191,8 @@ def judged_path_move(
     free, n_clusters = take_out(trials, trial, clusters, path)
     if owner >= 0 and clusters.n_trials[owner] == 0:
         owner = free
-    paths, scores = slip_paths(each_slot, trial, done, clusters, free, log_new[n_clusters], log_odds)
     prior = cluster_weights(each_slot, trial, clusters, free, log_new[n_clusters])
+    paths, scores = slip_paths(each_slot, trial, done, clusters, free, prior, log_odds)
     least = scores.max() - _MARGIN
     judged = np.empty((scores.size, looks.shape[1]), np.bool_)
     table = np.empty(clusters.tables.shape[1:])

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from atg_fg.core.patterns import IntArray
-from atg_fg.inference.kernels.compilation import NONE, compiled, compiled_within, written_out
+from atg_fg.inference.kernels.compilation import NONE, ZERO, compiled, compiled_within, written_out
 
 #: Looks that one integer has a bit for.
 _BITS = 62
@@ -294,7 +294,7 @@ def merge(
     for mode in range(n_modes):
         for slot in range(n_slots):
             add(automaton, mode, slot, NONE)
-    n_taken, n_looks = 0, 0
+    n_taken, n_looks = 0, ZERO
     for number in range(n_trials):
         length = lengths[number]
         trial = (symbols[number, :length], actions[number])

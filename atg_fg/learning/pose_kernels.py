@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.inference.kernels.compilation import compiled, compiled_within
+from atg_fg.inference.kernels.compilation import ZERO, compiled, compiled_within, written_out
 from atg_fg.learning.kernels import add_share, copy_into
 from atg_fg.learning.rates import AGAIN, FAILED, FAILED_BEFORE, REPEAT, REVEAL, SLIP, WRONG
 from atg_fg.learning.register_contents import SAME, TINY
@@ -20,7 +20,7 @@ Rows = tuple[IntArray, IntArray, IntArray, FloatArray, IntArray, FloatArray]
 Known = tuple[FloatArray, FloatArray]
 
 
-@compiled_within
+@written_out
 def probability_of_look(
     owner: IntArray, table: IntArray, in_view: IntArray, possible: FloatArray, shown: FloatArray, seen: IntArray
 ) -> FloatArray:
@@ -119,7 +119,7 @@ def weigh(
     return kept[:n_kept], truth[:n_kept], weights[:n_kept]
 
 
-@compiled_within
+@written_out
 def reveal(
     rows: Rows, known: Known, registers: IntArray, seen: IntArray, truth: FloatArray, repeat: float
 ) -> tuple[FloatArray, IntArray]:
@@ -188,7 +188,7 @@ def merged(
     everything = np.empty((n_old + len(tables), contents.shape[1], contents.shape[2]))
     for each in range(len(everything)):
         copy_into(everything[each], contents[each] if each < n_old else tables[each - n_old])
-    table, key, n_owners = of_row.copy(), np.empty(n_rows, np.int64), 0
+    table, key, n_owners = of_row.copy(), np.empty(n_rows, np.int64), ZERO
     for index in range(len(changed)):
         table[changed[index]] = n_old + index
     for row in range(n_rows):

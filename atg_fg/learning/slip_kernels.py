@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.inference.kernels.compilation import compiled, compiled_within
+from atg_fg.inference.kernels.compilation import compiled, compiled_within, written_out
 from atg_fg.learning.gibbs_kernels import count_votes, log_total, put_in, take_out
 from atg_fg.learning.kernels import SMALL, Clusters, TrialArrays, copy_into, draw_by_logarithm
 from atg_fg.learning.object_kernels import cluster_weights
@@ -29,10 +29,9 @@ def slip_moves(
     done: IntArray,
     log_odds: float,
     log_new: FloatArray,
-    n_tries: int,
     rng: np.random.Generator,
 ) -> None:
-    """Toggle actions of a trial between what was asked for and *stay*, then draw its object and start.
+    """Toggle an action of a trial between what was asked for and *stay*, then draw its object and start.
 
     Args:
         trials: All of them; the actions of this one are changed in place.
@@ -41,28 +40,28 @@ def slip_moves(
         done: The actions that were asked for, shape [T].
         log_odds: ln ε / (1 − ε) of a slip.
         log_new: As for ``trial_move``.
-        n_tries: How many toggles are tried.
         rng: Draws.
     """
     path, stay = np.empty(trials.looks.shape[1], np.int64), clusters.successors.shape[1] - 1
     free, n_clusters = take_out(trials, trial, clusters, path)
-    weights = np.empty((len(clusters.n_trials), len(clusters.registers)))
-    toggled = np.empty_like(weights)
-    trial_weights(trials, trial, clusters, free, log_new[n_clusters], weights)
-    before = log_total(weights.ravel())
-    for _ in range(n_tries if trials.lengths[trial] > 1 else 0):
-        time = rng.integers(0, trials.lengths[trial] - 1)
-        old = trials.actions[trial, time]
-        trials.actions[trial, time] = done[time] if old == stay else stay
-        trial_weights(trials, trial, clusters, free, log_new[n_clusters], toggled)
-        after = log_total(toggled.ravel())
-        gain = after - before + (log_odds if old != stay else -log_odds)
-        if rng.random() < 1.0 / (1.0 + np.exp(-gain)):
-            before, weights, toggled = after, toggled, weights
-        else:
-            trials.actions[trial, time] = old
-    drawn = draw_by_logarithm(weights.ravel(), 1.0, rng)
-    put_in(trials, trial, clusters, drawn // weights.shape[1], drawn % weights.shape[1], path)
+    prior = cluster_weights(trials, trial, clusters, free, log_new[n_clusters])
+    # As the trial is now, and toggled.
+    weights, total, chosen = np.empty((2, len(clusters.n_trials), len(clusters.registers))), np.empty(2), 0
+    for toggled in range(2 if trials.lengths[trial] > 1 else 1):
+        if toggled:
+            time = rng.integers(0, trials.lengths[trial] - 1)
+            old = trials.actions[trial, time]
+            trials.actions[trial, time] = done[time] if old == stay else stay
+        trial_weights(trials, trial, clusters, free, prior, weights[toggled])
+        total[toggled] = log_total(weights[toggled].ravel())
+        if toggled:
+            gain = total[1] - total[0] + (log_odds if old != stay else -log_odds)
+            if rng.random() < 1.0 / (1.0 + np.exp(-gain)):
+                chosen = 1
+            else:
+                trials.actions[trial, time] = old
+    drawn = draw_by_logarithm(weights[chosen].ravel(), 1.0, rng)
+    put_in(trials, trial, clusters, drawn // weights.shape[2], drawn % weights.shape[2], path)
 
 
 class Paths(NamedTuple):
@@ -97,9 +96,24 @@ class _Work(NamedTuple):
 
 @compiled
 def slip_paths(
-    trials: TrialArrays, trial: int, done: IntArray, clusters: Clusters, free: int, log_new: float, log_odds: float
+    trials: TrialArrays,
+    trial: int,
+    done: IntArray,
+    clusters: Clusters,
+    free: int,
+    all_prior: FloatArray,
+    log_odds: float,
 ) -> tuple[Paths, FloatArray]:
     """Follow all ways a trial may have gone, by the shared automaton, without the ones that become negligible.
+
+    Args:
+        trials: All of them.
+        trial: One that is taken out.
+        done: As for ``slip_moves``.
+        clusters: Of the others.
+        free: The cluster that stands for a new object.
+        all_prior: Ln of what each cluster weighs before the looks, shape [C].
+        log_odds: As for ``slip_moves``.
 
     Returns:
         The paths and ln p(trial, path | cluster), shape [B, C].
@@ -114,7 +128,6 @@ def slip_paths(
         np.ones((capacity, tables.shape[0], tables.shape[1])),
         np.ones((capacity, tables.shape[0], len(members))),
     )
-    all_prior = cluster_weights(trials, trial, clusters, free, log_new)
     prior, best = np.empty(len(members)), np.empty(capacity)
     for number in range(len(members)):
         prior[number] = all_prior[members[number]]
@@ -133,7 +146,7 @@ def slip_paths(
     return Paths(paths.slipped[:n_paths].copy(), paths.start[:n_paths].copy(), paths.log_prior[:n_paths].copy()), scores
 
 
-@compiled_within
+@written_out
 def branch(paths: Paths, work: _Work, n_paths: int, time: int, successors: IntArray, log_odds: float) -> int:
     """Let each path go on, and leave another behind for a slip; return how many there are then."""
     log_slip, log_stay = log_odds - np.log1p(np.exp(log_odds)), -np.log1p(np.exp(log_odds))
@@ -202,7 +215,7 @@ def score_of(work: _Work, path: int, number: int, log_prior: float, prior: Float
     return float(score)
 
 
-@compiled_within
+@written_out
 def drop(paths: Paths, work: _Work, best: FloatArray) -> int:
     """Forget paths that are negligible beside the best; return how many are left. These are in order, best first."""
     n_paths, least, n_kept = len(best), best.max() + np.log(_LEAST_PATH), 0
@@ -239,7 +252,8 @@ def path_move(
     """
     path, stay = np.empty(trials.looks.shape[1], np.int64), clusters.successors.shape[1] - 1
     free, n_clusters = take_out(trials, trial, clusters, path)
-    paths, scores = slip_paths(trials, trial, done, clusters, free, log_new[n_clusters], log_odds)
+    prior = cluster_weights(trials, trial, clusters, free, log_new[n_clusters])
+    paths, scores = slip_paths(trials, trial, done, clusters, free, prior, log_odds)
     if len(votes) > 0:
         count_votes(np.ascontiguousarray(scores.T), free, votes)
     drawn = draw_by_logarithm(scores.ravel(), 1.0, rng)

@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.inference.kernels.compilation import compiled, compiled_within
+from atg_fg.inference.kernels.compilation import compiled, compiled_within, written_out
 from atg_fg.learning.kernels import SMALL, Clusters, TrialArrays, draw_by_logarithm, learn_all_again, shuffled, walk
 
 #: Likelihoods that may be multiplied into a table before it is normalised, lest they leave the range of numbers.
@@ -122,7 +122,7 @@ def score_successors(
         successors[action, state] = old
 
 
-@compiled_within
+@written_out
 def find_passes(
     trials: TrialArrays, clusters: Clusters, automaton: int, action: int, state: int, paths: IntArray, work: _Work
 ) -> bool:
@@ -143,7 +143,7 @@ def find_passes(
     return result
 
 
-@compiled_within
+@written_out
 def multiply_before(trials: TrialArrays, clusters: Clusters, paths: IntArray, work: _Work) -> None:
     """Multiply looks up to the first pass into the tables of all objects with trials that pass, and normalise them."""
     before, is_there, n_factors, is_passed = work.before, work.is_there, work.n_factors, work.is_passed
@@ -173,7 +173,7 @@ def multiply_before(trials: TrialArrays, clusters: Clusters, paths: IntArray, wo
             normalise(before, is_there, cluster)
 
 
-@compiled_within
+@written_out
 def multiply_after(trials: TrialArrays, clusters: Clusters, successors: IntArray, state: int, work: _Work) -> float:
     """Return ln p(looks after the first pass of each trial | all that came before)."""
     before, after, is_there, n_factors = work.before, work.after, work.is_there, work.n_factors

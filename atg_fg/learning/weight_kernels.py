@@ -10,14 +10,13 @@ from __future__ import annotations
 import numpy as np
 
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.inference.kernels.compilation import compiled, compiled_within
+from atg_fg.inference.kernels.compilation import compiled, compiled_within, written_out
 from atg_fg.learning.kernels import SMALL, Clusters, TrialArrays, log_product, look_up, walk
-from atg_fg.learning.object_kernels import cluster_weights
 
 
 @compiled
 def trial_weights(
-    trials: TrialArrays, trial: int, clusters: Clusters, free: int, log_new: float, weights: FloatArray
+    trials: TrialArrays, trial: int, clusters: Clusters, free: int, prior: FloatArray, weights: FloatArray
 ) -> None:
     """Fill in ln p(trial, start | cluster) up to the prior of starts, shape [C, S]; −∞ of clusters that are not there.
 
@@ -26,19 +25,18 @@ def trial_weights(
         trial: One that is taken out.
         clusters: Of the others.
         free: The cluster that stands for a new object.
-        log_new: Ln of its weight beside that of each known object.
+        prior: Ln of what each cluster weighs before the looks, as ``cluster_weights`` has it, shape [C].
         weights: To be filled in.
     """
     weights[:] = -np.inf
     weigh_sharing(trials, trial, clusters, free, weights)
     weigh_others(trials, trial, clusters, weights)
-    prior = cluster_weights(trials, trial, clusters, free, log_new)
     for cluster in range(len(prior)):
         for start in range(weights.shape[1]):
             weights[cluster, start] += prior[cluster]
 
 
-@compiled_within
+@written_out
 def weigh_others(trials: TrialArrays, trial: int, clusters: Clusters, weights: FloatArray) -> None:
     """Fill in the weights of clusters that follow an automaton of their own."""
     local, visited = np.empty(clusters.tables.shape[1:]), np.empty(clusters.tables.shape[1], np.int64)
@@ -52,7 +50,7 @@ def weigh_others(trials: TrialArrays, trial: int, clusters: Clusters, weights: F
                 weights[cluster, start] = scale + log_product(clusters.tables[cluster], local, visited, n_visited)
 
 
-@compiled_within
+@written_out
 def weigh_sharing(trials: TrialArrays, trial: int, clusters: Clusters, free: int, weights: FloatArray) -> None:
     """Fill in the weights of clusters that follow the shared automaton, and of the one for a new object."""
     members, tables = side_by_side(clusters, free)

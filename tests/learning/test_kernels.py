@@ -6,7 +6,15 @@ import numpy as np
 import pytest
 
 from atg_fg.learning import chain as sampler
-from atg_fg.learning import gibbs_kernels, kernels, map_kernels, slip_kernels, transition_kernels, weight_kernels
+from atg_fg.learning import (
+    gibbs_kernels,
+    kernels,
+    map_kernels,
+    object_kernels,
+    slip_kernels,
+    transition_kernels,
+    weight_kernels,
+)
 from atg_fg.learning.chain import Chain
 from atg_fg.learning.detector_noise import DetectorNoise
 from atg_fg.learning.kernels import TrialArrays
@@ -99,7 +107,8 @@ def test_weights_of_a_trial_are_those_of_enumeration():
     trials = drawn_trials(np.random.default_rng(3))
     chain, _ = chain_of(trials, [0, 0, 1, -1], [0, 2, 1, 0])
     weights = np.zeros((len(chain.clusters.n_trials), 3))
-    weight_kernels.trial_weights(trials, 3, chain.clusters, 2, 0.7, weights)
+    prior = object_kernels.cluster_weights(trials, 3, chain.clusters, 2, 0.7)
+    weight_kernels.trial_weights(trials, 3, chain.clusters, 2, prior, weights)
     clusters = [[(0, 0, ()), (1, 2, ())], [(2, 1, ())]]
     for start in range(3):
         for number, cluster in enumerate(clusters):
@@ -133,7 +142,8 @@ def test_paths_with_slips_are_all_there_and_weigh_what_enumeration_says():
     chain, _ = chain_of(trials, [0, -1], [1, 0])
     odds = np.log(0.2 / 0.8)
     kernels.forget(chain.clusters, 1)
-    paths, scores = slip_kernels.slip_paths(trials, 1, trials.actions[1], chain.clusters, 1, -0.3, odds)
+    prior = object_kernels.cluster_weights(trials, 1, chain.clusters, 1, -0.3)
+    paths, scores = slip_kernels.slip_paths(trials, 1, trials.actions[1], chain.clusters, 1, prior, odds)
     subsets = [slips for n in range(4) for slips in itertools.combinations(range(3), n)]
     found = {
         (int(start), tuple(np.flatnonzero(slipped))): row

@@ -16,7 +16,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 
 from atg_fg.core.patterns import FloatArray
-from atg_fg.inference.kernels.compilation import NONE, compiled, compiled_within
+from atg_fg.inference.kernels.compilation import NONE, compiled, compiled_within, written_out
 from atg_fg.inference.kernels.table_kernels import SmallIntArray, count, weigh
 
 #: In place of an action: nothing happened, or the trial begins.
@@ -152,7 +152,7 @@ def step(
     return float(log_probability)
 
 
-@compiled_within
+@written_out
 def _learn(
     tables: tuple[Any, ...],
     constants: tuple[Any, ...],
@@ -201,7 +201,7 @@ def _state_showing(patterns: SmallIntArray, hypothesis: int, n_own: int, wanted:
     return found
 
 
-@compiled_within
+@written_out
 def _explain_one(
     tables: tuple[Any, ...],
     constants: tuple[Any, ...],
@@ -227,7 +227,7 @@ def _explain_one(
         states[hypothesis], totals[hypothesis], rates[hypothesis] = state, total, rate
 
 
-@compiled_within
+@written_out
 def _explain(
     tables: tuple[Any, ...],
     constants: tuple[Any, ...],

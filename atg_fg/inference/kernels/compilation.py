@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import os
 from collections.abc import Callable
 from functools import cache
@@ -17,8 +18,10 @@ _Function = TypeVar("_Function", bound=Callable[..., Any])
 #: Environment variable that turns compiled filters off when it is ``0``: NumPy then computes what they would.
 SWITCH: Final = "ATG_FG_KERNELS"
 
-#: −1 for no index in a compiled function. The literal has a type of its own, for which callees are compiled once more.
+#: −1 for no index, and 0, in a compiled function. Literals have types of their own, for which callees are compiled
+#: once more.
 NONE: Final[Any] = np.int64(-1)
+ZERO: Final[Any] = np.int64(0)
 
 #: No one calls by a pointer what is compiled: a function for that would have to be compiled, too.
 _OPTIONS: Final = {"cache": True, "error_model": "numpy", "no_cfunc_wrapper": True}
@@ -92,7 +95,10 @@ def reordered(function: _Function) -> _Function:
 
 @cache
 def _numba() -> Any:
-    """Return Numba, which from now on says when it compiles."""
+    """Return Numba, which from now on says when it compiles, and has no garbage collected meanwhile.
+
+    What it makes for one function lives until that is compiled: to go through it time and again took a tenth of all.
+    """
     try:
         import numba
     except ImportError as error:
@@ -100,14 +106,23 @@ def _numba() -> Any:
     from numba.core import event
 
     class Listener(event.Listener):
+        n_begun = 0
+        collects = False
+
         def on_start(self, event: Any) -> None:
             global _tell
             tell, _tell = _tell, None
             if tell is not None:
                 tell()
+            if self.n_begun == 0:
+                self.collects = gc.isenabled()
+                gc.disable()
+            self.n_begun += 1
 
         def on_end(self, event: Any) -> None:
-            pass
+            self.n_begun -= 1
+            if self.n_begun == 0 and self.collects:
+                gc.enable()
 
     event.register("numba:compile", Listener())  # type: ignore[no-untyped-call]
     return numba

@@ -12,7 +12,7 @@ from typing import Any, Final
 import numpy as np
 
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.inference.kernels.compilation import compiled, compiled_within, reordered
+from atg_fg.inference.kernels.compilation import ZERO, compiled, compiled_within, reordered
 
 #: Smallest normal number, in place of zero under a logarithm: x ln x of what is below it is zero up to rounding.
 _LEAST: Final = float(np.finfo(np.float64).tiny)
@@ -126,7 +126,7 @@ def next_looks(
     padded = (n_actions + 3) // 4 * 4
     more, everywhere, added = np.zeros(padded), np.zeros(n_actions), np.zeros(n_patterns * padded)
     reached, n_reached, block = np.empty(n_actions * _BLOCK), np.zeros(n_actions, np.int64), _BLOCK
-    others, factors, n_others = np.empty(n_actions * _BLOCK), np.empty(n_actions * _BLOCK), 0
+    others, factors, n_others = np.empty(n_actions * _BLOCK), np.empty(n_actions * _BLOCK), ZERO
     terms[:] = 0.0
     for hypothesis in range(len(weights)):
         weight, n_own = weights[hypothesis], n_known[hypothesis]
@@ -136,7 +136,7 @@ def next_looks(
             rate = (n_aspects - n_own) / n_aspects * (observed / (n_patterns - n_own))
         if n_others + 2 > _BLOCK:
             _add_others(terms, others, factors, n_others)
-            n_others = 0
+            n_others = ZERO
         row, own = hypothesis * width, hypothesis * (n_actions + 1)
         for action in range(n_actions):
             edge, last = begins[_place(own + action)], begins[_place(own + action + 1)]
@@ -177,7 +177,7 @@ def next_looks(
                 added[_place(known + 2)] += three
                 added[_place(known + 3)] += last_one
     _add_others(terms, others, factors, n_others)
-    _add_reached(terms, reached, n_reached, 0)
+    _add_reached(terms, reached, n_reached, ZERO)
     for action in range(n_actions):
         for each in range(n_patterns):
             predictive[action, each] = added[each * padded + action] + everywhere[action]

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import gc
 import os
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from numba.core import event
+
+from atg_fg.inference.kernels import belief_kernels  # noqa: F401  (it has Numba listened to)
 
 TRIAL = """
 import sys
@@ -59,3 +63,21 @@ def test_the_switch_leaves_compiled_loops_out() -> None:
 def test_nothing_loads_numba_before_it_is_used() -> None:
     code = "import sys, atg_fg, atg_fg.cli, atg_fg.engines.bayes_filter; print('numba' in sys.modules)"
     assert printed(code) == ["False"]
+
+
+def test_no_garbage_is_collected_until_all_that_one_loop_calls_is_compiled() -> None:
+    with event.trigger_event("numba:compile"):
+        with event.trigger_event("numba:compile"):
+            assert not gc.isenabled()
+        assert not gc.isenabled()
+    assert gc.isenabled()
+
+
+def test_a_process_that_collects_no_garbage_does_not_begin_to_with_compilation() -> None:
+    gc.disable()
+    try:
+        with event.trigger_event("numba:compile"):
+            pass
+        assert not gc.isenabled()
+    finally:
+        gc.enable()
