@@ -46,6 +46,15 @@ class MissingDependencyError(AtgError, ImportError):
 
 
 @contextmanager
+def placed(place: str) -> Iterator[None]:
+    """Put a place in front of the message of an error about input or a name that is raised inside."""
+    try:
+        yield
+    except (InvalidInputError, UnknownNameError) as error:
+        raise type(error)(f"{place}: {error}") from error
+
+
+@contextmanager
 def needed_by(what: str, package: str, extra: str) -> Iterator[None]:
     """Say what needs a package, and which extra brings it, where what is imported inside is not installed.
 

@@ -385,7 +385,7 @@ class RobotMemory(Persistent):
         return self.table()._repr_html_()
 
     def __repr__(self) -> str:
-        return f"RobotMemory({len(self)} of {self.assumptions.n_objects} objects)"
+        return f"{type(self).__name__}({len(self)} of {self.assumptions.n_objects} objects)"
 
 
 _OBJECTS: Final = 12

@@ -11,7 +11,7 @@ import numpy as np
 
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.checks import listed
-from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.errors import InvalidInputError, placed
 from atg_fg.core.object_sense import ObjectSense, check_measured
 from atg_fg.core.patterns import Evidence, Measured, PatternAlphabet
 
@@ -120,13 +120,11 @@ class Recording:
         n_objects = n_objects or self.n_objects
         if n_objects is None:
             raise InvalidInputError(f"{self.place}: does not say how many objects there are; expected --objects N")
-        try:
+        with placed(self.place):
             alphabet = PatternAlphabet.named(self.slots, self.labels, exclusive=self.exclusive, is_open=is_open)
             n_aspects = self.n_aspects or min(len(alphabet), USUAL_ASPECTS)
             senses = tuple(self._sense(each) if isinstance(each, str) else each for each in self.senses)
             return Assumptions(n_objects, n_aspects, self.actions, alphabet, senses)
-        except InvalidInputError as error:
-            raise InvalidInputError(f"{self.place}: {error}") from error
 
     def _sense(self, name: str) -> ObjectSense:
         """Return what the readings of a sense say of it: actions reveal one if a reading mostly comes after them."""
@@ -170,13 +168,9 @@ def assumptions_for(recording: Recording, assumptions: Assumptions) -> Assumptio
         raise InvalidInputError(
             f"{recording.place}: has labels, and the memory numbers alone; expected a memory that knows labels"
         )
-    try:
+    with placed(recording.place):
         extended = alphabet.extended(used_labels(recording.trials))
-    except InvalidInputError as error:
-        raise InvalidInputError(f"{recording.place}: {error}") from error
-    if extended is alphabet:
-        return assumptions
-    return replace(assumptions, alphabet=extended)
+    return assumptions if extended is alphabet else replace(assumptions, alphabet=extended)
 
 
 def used_labels(trials: Sequence[RecordedTrial]) -> list[str]:

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 from atg_fg.core.assumptions import Assumptions
-from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.errors import InvalidInputError, placed
 from atg_fg.core.looks import measured_in, truth_of
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
@@ -164,10 +164,8 @@ def check(recording: Recording, assumptions: Assumptions, *, taught: bool = Fals
 def _evidence(trial: RecordedTrial, assumptions: Assumptions, place: str) -> list[Evidence]:
     looks = []
     for step, look in enumerate(trial.looks):
-        try:
+        with placed(f"{place}: trial {trial.name}, step {step}"):
             looks.append(look.evidence(assumptions))
-        except InvalidInputError as error:
-            raise InvalidInputError(f"{place}: trial {trial.name}, step {step}: {error}") from error
     return looks
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Final
 
 from atg_fg.core.assumptions import Assumptions
-from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.errors import InvalidInputError, placed
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence
@@ -26,7 +26,6 @@ from atg_fg.report.content import Look, Report, TrialPage, shown_parameters
 from atg_fg.report.pictures import MOST_CROPS, thumbnails
 from atg_fg.report.summaries import looks_of, told_mistakes, told_truth, told_verdict, with_graphs
 from atg_fg.report.trial_record import best_objects
-from atg_fg.storage.checked_json import placed
 from atg_fg.storage.recorded_test import RecordedTest
 
 #: How near a belief that is inferred again must be to the recorded one.

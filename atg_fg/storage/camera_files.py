@@ -10,10 +10,10 @@ from typing import Any, Final
 import numpy as np
 
 from atg_fg.core.checks import number, plain_text, whole_number
-from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.errors import InvalidInputError, placed
 from atg_fg.senses.camera_calibration import Calibration
 from atg_fg.senses.tags import Tags, check_ids, dictionary_name
-from atg_fg.storage.checked_json import check_format, parse_json, placed, read_entries, read_list, read_object
+from atg_fg.storage.checked_json import check_format, parse_json, read_entries, read_list, read_object
 from atg_fg.storage.plain_files import read_text_file
 
 CALIBRATION_FORMAT: Final = "atg-fg/camera"

@@ -8,14 +8,13 @@ from __future__ import annotations
 import json
 import math
 from collections import Counter
-from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import Any, Final, NoReturn
 
 import numpy as np
 
 from atg_fg.core.checks import brief, plain_text
-from atg_fg.core.errors import InvalidInputError, UnknownNameError
+from atg_fg.core.errors import InvalidInputError
 
 #: Levels of lists and objects in what a file may say freely, such as the truth of a look.
 MAX_DEPTH: Final = 20
@@ -130,12 +129,3 @@ def check_format(document: dict[str, Any], name: str, place: str, newest: int = 
         expected = " or ".join(map(str, range(1, newest + 1)))
         raise InvalidInputError(f"{place}: version: {brief(version)}; expected {expected}")
     return int(version)
-
-
-@contextmanager
-def placed(place: str) -> Iterator[None]:
-    """Put a place in front of the message of an error about input or a name that is raised inside."""
-    try:
-        yield
-    except (InvalidInputError, UnknownNameError) as error:
-        raise type(error)(f"{place}: {error}") from error

@@ -16,9 +16,9 @@ from atg_fg.core.assumptions import MAX_NUMBER, Assumptions
 from atg_fg.core.checks import plain_text
 from atg_fg.core.compact.columns import AnyIntArray
 from atg_fg.core.compact.compact_memory import CompactMemory, GraphArrays, compacted
-from atg_fg.core.errors import InvalidInputError, TooLargeError
+from atg_fg.core.errors import InvalidInputError, TooLargeError, placed
 from atg_fg.core.patterns import IntArray
-from atg_fg.storage.checked_json import check_format, parse_json, placed, read_entries, read_object
+from atg_fg.storage.checked_json import check_format, parse_json, read_entries, read_object
 from atg_fg.storage.limits import refuse_size, unpacked_limit
 from atg_fg.storage.memory_json import read_assumptions, write_assumptions
 from atg_fg.storage.plain_files import read_bytes_file, starts_with, write_bytes_atomically

@@ -8,19 +8,12 @@ from typing import Any, Final
 from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.checks import plain_text, whole_number
+from atg_fg.core.errors import placed
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.merging import Merge
 from atg_fg.core.patterns import PatternAlphabet
 from atg_fg.learning.structured_memory import StructuredMemory
-from atg_fg.storage.checked_json import (
-    check_format,
-    parse_json,
-    placed,
-    read_entries,
-    read_list,
-    read_object,
-    without_none,
-)
+from atg_fg.storage.checked_json import check_format, parse_json, read_entries, read_list, read_object, without_none
 from atg_fg.storage.evidence_json import read_evidence, write_evidence
 from atg_fg.storage.object_sense_json import read_moments, read_object_senses, write_moments, write_object_sense
 from atg_fg.storage.sense_json import read_sense, write_sense

@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 from typing import Any, Final
 
 from atg_fg.core.checks import number, plain_text, whole_number
-from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.errors import InvalidInputError, placed
 from atg_fg.core.object_sense import Moments, ObjectSense, check_measured
 from atg_fg.core.patterns import Measured
-from atg_fg.storage.checked_json import placed, read_entries, read_list, read_object
+from atg_fg.storage.checked_json import read_entries, read_list, read_object
 
 #: Sums of readings and of their squares are numbers up to here.
 _GREATEST: Final = 1e100

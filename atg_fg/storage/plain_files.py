@@ -167,7 +167,7 @@ def write_bytes_atomically(path: Path | str, content: bytes) -> None:
             reads from a named pipe within ``PIPE_WAIT`` seconds.
         BrokenPipeError: Whoever reads from a pipe has gone.
     """
-    try:
+    with _writing_to(path):
         path = os.fspath(path) or "."  # nothing stands for this folder
         descriptor = _descriptor_of(path)
         if descriptor is not None:
@@ -180,12 +180,6 @@ def write_bytes_atomically(path: Path | str, content: bytes) -> None:
             write_in_place(path, content)
             return
         _replace(Path(os.path.realpath(path)), content, status)
-    except BrokenPipeError:
-        raise
-    except (OSError, ValueError) as error:
-        if isinstance(error, InvalidInputError):
-            raise
-        raise _cannot_write(path, error) from error
 
 
 def check_writable(path: Path | str) -> None:
@@ -193,7 +187,7 @@ def check_writable(path: Path | str) -> None:
 
     Called before long work, so that its result is not lost at the end.
     """
-    try:
+    with _writing_to(path):
         path = os.fspath(path) or "."  # nothing stands for this folder
         descriptor = _descriptor_of(path)
         status = _status(path) if descriptor is None else os.fstat(descriptor)
@@ -204,10 +198,6 @@ def check_writable(path: Path | str) -> None:
         if descriptor is None and (status is None or stat.S_ISREG(status.st_mode)):
             with tempfile.TemporaryFile(dir=Path(os.path.realpath(path)).parent):
                 pass
-    except (OSError, ValueError) as error:
-        if isinstance(error, InvalidInputError):
-            raise
-        raise _cannot_write(path, error) from error
 
 
 def make_folder(path: Path | str) -> Path:
@@ -217,12 +207,10 @@ def make_folder(path: Path | str) -> Path:
         InvalidInputError: It cannot be made or written.
     """
     folder = Path(path)
-    try:
+    with _writing_to(path):
         folder.mkdir(parents=True, exist_ok=True)
         with tempfile.TemporaryFile(dir=folder):
             pass
-    except (OSError, ValueError) as error:
-        raise _cannot_write(path, error) from error
     return folder
 
 
@@ -342,6 +330,14 @@ def _is_folder(path: Path | str) -> InvalidInputError:
     return InvalidInputError(f"{path}: is a folder; expected the path of a file")
 
 
-def _cannot_write(path: Path | str, error: Exception) -> InvalidInputError:
-    reason = error.strerror if isinstance(error, OSError) else str(error)
-    return InvalidInputError(f"{path}: cannot be written: {reason}; expected a path in a folder that can be written")
+@contextmanager
+def _writing_to(path: Path | str) -> Iterator[None]:
+    """Say which path it is that cannot be written, but for a pipe whose reader has gone."""
+    try:
+        yield
+    except (InvalidInputError, BrokenPipeError):
+        raise
+    except (OSError, ValueError) as error:
+        reason = error.strerror if isinstance(error, OSError) else str(error)
+        expected = "expected a path in a folder that can be written"
+        raise InvalidInputError(f"{path}: cannot be written: {reason}; {expected}") from error

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from importlib.resources import files
 from typing import Any, Final
 
-from atg_fg.core.errors import InvalidInputError, unknown_name
+from atg_fg.core.errors import InvalidInputError, placed, unknown_name
 from atg_fg.core.parameters import ModelParameters
-from atg_fg.storage.checked_json import check_format, parse_json, placed, read_object
+from atg_fg.storage.checked_json import check_format, parse_json, read_object
 from atg_fg.storage.plain_files import read_text_file
 
 PRESET_FORMAT: Final = "atg-fg/preset"

@@ -12,9 +12,9 @@ from typing import Any, Final
 
 from atg_fg.core.assumptions import MAX_NUMBER, Assumptions, arcube_assumptions
 from atg_fg.core.checks import number, plain_text, whole_number
-from atg_fg.core.errors import AtgError, InvalidInputError
+from atg_fg.core.errors import AtgError, InvalidInputError, placed
 from atg_fg.core.parameters import ModelParameters
-from atg_fg.storage.checked_json import placed, read_info, read_object
+from atg_fg.storage.checked_json import read_info, read_object
 from atg_fg.worlds.registry import ARCUBE_WORLDS, WORLDS, assumptions_of, make_world
 
 _PARAMETERS: Final = tuple(field.name for field in fields(ModelParameters))

@@ -13,19 +13,11 @@ from pathlib import Path
 from typing import Any, Final, NamedTuple
 
 from atg_fg.core.checks import brief, distinct_names, listed, number, plain_text, whole_number
-from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.errors import InvalidInputError, placed
 from atg_fg.core.object_sense import GREATEST_READING, ObjectSense
 from atg_fg.core.patterns import Measured
 from atg_fg.core.recordings import RecordedLook, RecordedTrial, Recording, senses_of, used_labels
-from atg_fg.storage.checked_json import (
-    check_format,
-    parse_json,
-    placed,
-    read_entries,
-    read_list,
-    read_object,
-    without_none,
-)
+from atg_fg.storage.checked_json import check_format, parse_json, read_entries, read_list, read_object, without_none
 from atg_fg.storage.object_sense_json import read_object_senses, write_object_sense
 from atg_fg.storage.plain_files import read_text_file, write_bytes_atomically
 from atg_fg.storage.recording_csv import CsvReader, Fault

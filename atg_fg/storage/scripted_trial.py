@@ -10,13 +10,13 @@ from dataclasses import dataclass
 from typing import Any, Final
 
 from atg_fg.core.checks import brief, number
-from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.errors import InvalidInputError, placed
 from atg_fg.core.memory import RobotMemory
 from atg_fg.core.object_sense import check_measured
 from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Confidences, Evidence, PatternAlphabet
 from atg_fg.core.slot_checks import check_confidences
-from atg_fg.storage.checked_json import check_format, parse_json, placed, read_entries, read_list, read_object
+from atg_fg.storage.checked_json import check_format, parse_json, read_entries, read_list, read_object
 from atg_fg.storage.memory_json import read_assumptions, read_memory
 
 SCRIPT_FORMAT: Final = "atg-fg/scripted-trial"

@@ -8,11 +8,11 @@ import numpy as np
 
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.checks import GREATEST, number, plain_text
-from atg_fg.core.errors import InvalidInputError
+from atg_fg.core.errors import InvalidInputError, placed
 from atg_fg.core.sense import Sense, SensedTrial
 from atg_fg.senses.appearance import AppearanceSense
 from atg_fg.senses.feature_space import FeatureSpace
-from atg_fg.storage.checked_json import placed, read_entries, read_list, read_object
+from atg_fg.storage.checked_json import read_entries, read_list, read_object
 
 
 def write_sense(sense: Sense, assumptions: Assumptions) -> dict[str, Any]:

@@ -10,7 +10,7 @@ from typing import Any, Final
 
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.checks import number, whole_number
-from atg_fg.core.errors import InvalidInputError, TooLargeError
+from atg_fg.core.errors import InvalidInputError, TooLargeError, placed
 from atg_fg.core.patterns import Detection, SlotLikelihoods
 from atg_fg.core.slot_checks import check_confidences, check_slots
 from atg_fg.learning.kinds import MAX_KINDS
@@ -19,7 +19,7 @@ from atg_fg.learning.plain_evidence import UNCERTAIN, USUAL, PlainNoise
 from atg_fg.learning.rates import PRIORS, Rates
 from atg_fg.learning.raw_trials import RawTrial
 from atg_fg.learning.shared_structure import SharedStructure
-from atg_fg.storage.checked_json import placed, read_entries, read_list, read_object
+from atg_fg.storage.checked_json import read_entries, read_list, read_object
 from atg_fg.storage.object_sense_json import read_readings, write_readings
 
 

@@ -251,9 +251,6 @@ class CompactMemory(RobotMemory):
     def __iter__(self) -> Iterator[AspectTransitionGraph]:
         return (self.graph(number) for number in range(len(self)))
 
-    def __repr__(self) -> str:
-        return f"CompactMemory({len(self)} of {self.assumptions.n_objects} objects)"
-
 
 class GraphColumns:
     """The arrays of all ATGs, as columns that grow; each ATG has one piece of those of aspects and of transitions.
