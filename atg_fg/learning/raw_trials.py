@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -69,6 +70,12 @@ class RawTrial:
             measured if any(measured) else (),
         )
 
+    @cached_property
+    def symbols(self) -> IntArray:
+        """The symbol in each slot at each look, ``MISSING`` where nothing was seen, shape [t + 1, J]."""
+        seen = [[MISSING if symbol is None else symbol for symbol in look] for look in self.detections]
+        return read_only(np.array(seen, dtype=np.int64))
+
     def relabelled(self, labels: Relabelling) -> RawTrial:
         """Return the same trial under another alphabet."""
         detections = tuple(map(labels.detection, self.detections))
@@ -129,8 +136,7 @@ def side_by_side(trials: Sequence[RawTrial]) -> TrialArrays:
     symbols = np.full((len(trials), longest + 1, n_slots), MISSING, dtype=np.int64)
     actions = np.full((len(trials), longest), -1, dtype=np.int64)
     for number, trial in enumerate(trials):
-        seen = [[MISSING if symbol is None else symbol for symbol in look] for look in trial.detections]
-        symbols[number, : len(seen)] = seen
+        symbols[number, : len(trial.detections)] = trial.symbols
         actions[number, : len(trial.actions)] = trial.actions
     return TrialArrays(symbols, actions)
 
