@@ -144,29 +144,25 @@ class PathFilter:
     def predicted_patterns(self) -> tuple[IntArray, FloatArray]:
         """Return the owners that matter, shape [I], and p(next pattern | action, owner) of each, shape [A, I, |𝒵|]."""
         paths, owners, weights = self._pairs()
-        last, slip = self._states[:, -1], self._chain.slip
-        stayed = self._shown(paths, owners, last, weights * slip)
-        present = np.unique(owners)
-        moved = [
-            self._shown(paths, owners, successors[last], weights * (1.0 - slip))
-            for successors in self._chain.successors
-        ]
-        return present, np.array(moved) + stayed
+        last, slip, successors = self._states[:, -1], self._chain.slip, self._chain.successors
+        states = np.array([*(of_action[last] for of_action in successors), last])
+        chances = np.array([*[1.0 - slip] * len(successors), slip])
+        shown = self._shown(paths, owners, states, weights * chances[:, None])
+        return np.unique(owners), shown[:-1] + shown[-1]
 
     def shown_patterns(self) -> tuple[IntArray, FloatArray]:
         """Return the owners that matter, shape [I], and p(pattern shown now | owner) of each, shape [I, |𝒵|]."""
         paths, owners, weights = self._pairs()
-        return np.unique(owners), self._shown(paths, owners, self._states[:, -1], weights, self._unblurred)
+        (shown,) = self._shown(paths, owners, self._states[None, :, -1], weights[None], self._unblurred)
+        return np.unique(owners), shown
 
     def smoothed_patterns(self, owner: int) -> list[FloatArray]:
         """Return p(pattern shown at time s | owner, all evidence) of every time s, each of shape [|𝒵|]."""
         weights = self._given(owner)
         paths = np.flatnonzero(weights > UNIMPORTANT)
-        owners = np.full(len(paths), owner)
-        return [
-            self._shown(paths, owners, states, weights[paths] / weights[paths].sum(), self._unblurred)[0]
-            for states in self._states.T
-        ]
+        owners, n_looks = np.full(len(paths), owner), self._states.shape[1]
+        shares = np.tile(weights[paths] / weights[paths].sum(), (n_looks, 1))
+        return list(self._shown(paths, owners, self._states.T, shares, self._unblurred)[:, 0])
 
     def right_labels(self, owner: int, looks: list[Evidence]) -> list[tuple[float | None, ...]]:
         """Return p(label is right | owner, all evidence) of each slot at each look, ``None`` where none was seen."""
@@ -215,25 +211,26 @@ class PathFilter:
     def _shown(
         self, paths: IntArray, owners: IntArray, states: IntArray, weights: FloatArray, labels: FloatArray | None = None
     ) -> FloatArray:
-        """Return Σ weight · p(pattern) of each owner when each path is in these states, shape [I, |𝒵|].
+        """Return Σ weight · p(pattern) of each owner after each move, shape [M, I, |𝒵|].
 
         Args:
             paths: Of each pair, shape [Q].
             owners: Of each pair, ascending, shape [Q].
-            states: Of each path, shape [B].
-            weights: Of each pair, shape [Q].
+            states: In which each path is after each move, shape [M, B].
+            weights: Of each pair after each move, shape [M, Q].
             labels: p(label | symbol), shape [V, V]; as a detector's without confidences if not given.
         """
+        from atg_fg.learning import path_kernels  # they load Numba
+
         blurred = self._labels if labels is None else labels
-        product = np.ones((len(paths), len(self._alphabet)))
-        for slot, symbols in enumerate(self._alphabet.symbols.T):
-            register = self._chain.registers[states[paths], slot]
-            contents = self._chain.tables[owners, register] * self._local[paths, register]
-            contents /= np.maximum(contents.sum(axis=1, keepdims=True), np.finfo(float).tiny)
-            product *= (contents @ blurred)[:, symbols]
-        product *= (weights / np.maximum(product.sum(axis=1), np.finfo(float).tiny))[:, None]
-        first = np.flatnonzero(np.diff(owners, prepend=-1))
-        result: FloatArray = np.add.reduceat(product, first, axis=0)
+        result: FloatArray = path_kernels.patterns_shown(
+            (np.ascontiguousarray(paths), np.ascontiguousarray(owners)),
+            (self._chain.tables, self._local),
+            np.ascontiguousarray(self._chain.registers[states]),
+            weights,
+            blurred,
+            self._alphabet.symbols,
+        )
         return result
 
 
