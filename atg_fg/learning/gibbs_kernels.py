@@ -170,9 +170,12 @@ def count_votes(weights: FloatArray, free: int, votes: FloatArray) -> None:
     """Add p(cluster), summed over the second axis of logarithms, to votes, *new* after all that there are."""
     total, new = log_total(weights.ravel()), len(votes) - 1
     for cluster in range(len(weights)):
-        if weights[cluster].max() > -np.inf:
-            # What is beyond the clusters is new as well.
-            votes[new if cluster == free or cluster >= new else cluster] += np.exp(weights[cluster] - total).sum()
+        share = 0.0
+        for column in range(weights.shape[1]):
+            if weights[cluster, column] > -np.inf:
+                share += np.exp(weights[cluster, column] - total)
+        # What is beyond the clusters is new as well.
+        votes[new if cluster == free or cluster >= new else cluster] += share
 
 
 @compiled_within

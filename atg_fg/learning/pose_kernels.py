@@ -101,14 +101,16 @@ def weigh(
     total = np.zeros(n_owners)
     for row in range(n_rows):
         total[owner[row]] += weight[row] * (right[row] + wrong[owner[row]])
-    log_evidence += np.log(total)
-    importance = np.ones(n_owners)
-    if len(log_weights):
-        peak = (log_weights + log_evidence).max()
-        importance[:] = 0.0
-        if peak > -np.inf:
-            importance = np.exp(log_weights + log_evidence - peak)
-            importance /= importance.sum()
+    importance, peak, whole = np.ones(n_owners), -np.inf, 0.0
+    for each in range(n_owners):
+        log_evidence[each] += np.log(total[each])
+    for each in range(len(log_weights)):
+        peak = max(peak, log_weights[each] + log_evidence[each])
+    for each in range(len(log_weights)):
+        importance[each] = np.exp(log_weights[each] + log_evidence[each] - peak) if peak > -np.inf else 0.0
+        whole += importance[each]
+    for each in range(len(log_weights)):
+        importance[each] /= max(whole, _LEAST)
     kept, truth, weights, n_kept = np.empty(n_rows, np.int64), np.empty(n_rows), np.empty(n_rows), 0
     for row in range(n_rows):
         both = right[row] + wrong[owner[row]]

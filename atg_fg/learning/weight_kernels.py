@@ -73,7 +73,10 @@ def weigh_sharing(trials: TrialArrays, trial: int, clusters: Clusters, free: int
         _, scale = look_up(trials.looks[trial], length, path, clusters.registers, local, visited[first])
         is_known[:] = False
         for start in range(first, n_states):
-            if is_done[start] or np.any(visits[first] != visits[start]):
+            is_alike = not is_done[start]
+            for visit in range(visits.shape[1]):
+                is_alike = is_alike and visits[first, visit] == visits[start, visit]
+            if not is_alike:
                 continue
             is_done[start] = True
             product[:] = 1.0
