@@ -108,6 +108,8 @@ class PathFilter:
 
     def observe(self, evidence: Evidence) -> None:
         """Take in a look, as labels if it is a detection, else as a likelihood of each slot's symbol."""
+        from atg_fg.learning import path_kernels  # they load Numba
+
         self._joint = self._log_evidence = None
         if evidence.detection is None and not evidence.slots:
             likelihood = self._alphabet.slot_likelihoods(evidence.likelihood)
@@ -116,16 +118,8 @@ class PathFilter:
         for slot, weights in enumerate(evidence.slots):
             if weights is not None:
                 likelihood[slot] = MOST_CERTAIN * np.array(weights) + (1.0 - MOST_CERTAIN) * np.mean(weights)
-        for slot, weights in enumerate(likelihood):
-            register = self._chain.registers[self._states[:, -1], slot]
-            paths = np.arange(len(register))
-            local = self._local[paths, register] * weights
-            peak = np.maximum(local.max(axis=1), np.finfo(float).tiny)
-            self._local[paths, register] = local / peak[:, None]
-            # The scale is in the path's own weight, so that products of many looks stay in range.
-            self._log_prior += np.log(peak)
-            total = np.einsum("hbv,bv->bh", self._chain.tables[:, register], local / peak[:, None])
-            self._factors[paths, register] = np.log(np.maximum(total, np.finfo(float).tiny))
+        in_view = self._chain.registers[self._states[:, -1]]
+        path_kernels.take_in(likelihood, in_view, self._chain.tables, (self._log_prior, self._local, self._factors))
         self._drop()
 
     def observe_pattern(self, symbols: IntArray) -> None:

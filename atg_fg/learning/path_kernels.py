@@ -11,6 +11,37 @@ _LEAST = np.finfo(np.float64).tiny
 
 
 @compiled
+def take_in(
+    looks: FloatArray, in_view: IntArray, tables: FloatArray, paths: tuple[FloatArray, FloatArray, FloatArray]
+) -> None:
+    """Take in a look along each path.
+
+    Args:
+        looks: Likelihood of each symbol in each slot, shape [J, V].
+        in_view: The register in each slot at the end of each path, shape [B, J].
+        tables: p(symbol in a register) of each owner, shape [K + 1, R, V].
+        paths: ln of the weight of each [B], what the trial says of each register on it, of which the scale is in the
+            weight [B, R, V], and ln Σ_c of that times the table of each owner [B, R, K + 1]; changed in place.
+    """
+    log_prior, local, factors = paths
+    for path in range(len(in_view)):
+        for slot in range(len(looks)):
+            said, peak = local[path, in_view[path, slot]], _LEAST
+            for symbol in range(len(said)):
+                said[symbol] *= looks[slot, symbol]
+                peak = max(peak, said[symbol])
+            # The scale is in the path's own weight, so that products of many looks stay in range.
+            log_prior[path] += np.log(peak)
+            for symbol in range(len(said)):
+                said[symbol] /= peak
+            for owner in range(len(tables)):
+                total = 0.0
+                for symbol in range(len(said)):
+                    total += tables[owner, in_view[path, slot], symbol] * said[symbol]
+                factors[path, in_view[path, slot], owner] = np.log(max(total, _LEAST))
+
+
+@compiled
 def patterns_shown(
     pairs: tuple[IntArray, IntArray],
     contents: tuple[FloatArray, FloatArray],
