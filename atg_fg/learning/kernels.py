@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.inference.kernels.compilation import compiled, compiled_within
+from atg_fg.inference.kernels.compilation import compiled, compiled_within, written_out
 from atg_fg.learning.raw_trials import NOTHING_FELT
 
 #: Products are put aside as a logarithm before they leave the range of floating-point numbers.
@@ -234,7 +234,7 @@ def forget(clusters: Clusters, cluster: int) -> None:
             clusters.tables[cluster, register, symbol] = clusters.prior[symbol]
 
 
-@compiled_within
+@written_out
 def learn_again(trials: TrialArrays, clusters: Clusters, cluster: int, path: IntArray) -> float:
     """Make the table of a cluster anew from its trials; return ln of their evidence, given their starts."""
     forget(clusters, cluster)

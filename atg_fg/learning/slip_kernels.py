@@ -168,7 +168,7 @@ def branch(paths: Paths, work: _Work, n_paths: int, time: int, successors: IntAr
     return n_paths
 
 
-@compiled_within
+@written_out
 def take_in_look(
     trials: TrialArrays, trial: int, time: int, registers: IntArray, tables: FloatArray, work: _Work, path: int
 ) -> None:
@@ -181,7 +181,7 @@ def take_in_look(
         sum_products(tables, register, local[row], register, work.totals, row)
 
 
-@compiled_within
+@written_out
 def best_score(work: _Work, path: int, log_prior: float, prior: FloatArray, weights: FloatArray) -> float:
     """Return the greatest of the scores of a path, over clusters.
 
