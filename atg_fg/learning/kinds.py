@@ -122,6 +122,7 @@ def evidence_of_sets(table: FloatArray, sets: Sequence[Iterable[int]]) -> list[f
     for number, kinds in enumerate(sets):
         for kind in kinds:
             members[number, N_PLAIN + kind] = True
+    table = np.ascontiguousarray(table)  # the loop is compiled anew for what is laid out otherwise
     result: list[float] = kind_kernels.evidence_of_sets(table, _before(table), members, _ROUNDS).tolist()
     return result
 
