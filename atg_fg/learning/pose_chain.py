@@ -51,7 +51,8 @@ def pose_chain(
 
     State f · G + g is pose g of G, and bit k of f says whether the action at place k of ``repeated_actions`` failed
     when it was last done; f is 0 throughout if that makes no difference. It is exact for objects whose contents are
-    known. Registers that are not known count as drawn anew at each look.
+    known, as long as there is room for all repeated actions; to the others it makes no difference whether they failed.
+    Registers that are not known count as drawn anew at each look.
 
     Args:
         poses: Of the structure.

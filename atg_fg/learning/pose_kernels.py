@@ -331,7 +331,7 @@ def follow(
 def act(rows: Rows, successors: IntArray, actions: IntArray, slips: tuple[float, float]) -> Rows:
     """Move each row by the action of its owner, and leave a second one behind for a slip, after all that moved.
 
-    How probable a slip is, depends on how probably the action failed when it was last done.
+    A slip is the more probable the more probably the action failed when it was last done.
     """
     owner, start, pose, weight, table, events = rows
     n_rows = len(owner)

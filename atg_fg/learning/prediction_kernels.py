@@ -1,4 +1,4 @@
-"""Loops that predict what poses show after actions, compiled: its rows are many and short."""
+"""Loops that predict what poses show after actions, compiled: rows are many and short."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ PRIORS: Final[dict[str, tuple[float, float]]] = {
     "share": (1.0, 1.0),
     "slip_again": (1.0, 1.0),
 }
-#: ε′ is a rate of its own if it is so many nats better than ε.
+#: ε′ is a rate of its own if what was counted is so many nats more probable under it than under ε.
 CLEARLY: Final = 4.0
 
 
@@ -33,11 +33,12 @@ class Rates:
 
     Attributes:
         slip: ε, the probability that an action leaves the pose as it is.
-        slip_again: ε′, the same of an action that did so when it was last done in the trial; ``None`` if it is ε, too.
         wrong: δ, the probability that a look shows a pattern drawn uniformly.
         repeat: κ, the probability that a register's symbol is drawn from all symbols, rather than from those that the
             object does not have elsewhere.
         share: π, the probability that an object follows the structure.
+        slip_again: ε′, the probability of a slip if the action slipped when it was last done in the trial; ``None`` if
+            that makes no difference.
 
     Raises:
         InvalidInputError: A rate that is not.
@@ -61,7 +62,8 @@ class Rates:
 
     def by_name(self) -> dict[str, float]:
         """Return all rates, ε′ if it is one of its own."""
-        return {name: rate for name in PRIORS if (rate := getattr(self, name)) is not None}
+        own = PRIORS.keys() if self.slip_again is not None else [name for name in PRIORS if name != "slip_again"]
+        return {name: getattr(self, name) for name in own}
 
 
 class Tally(NamedTuple):

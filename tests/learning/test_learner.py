@@ -280,6 +280,13 @@ def test_a_rate_is_between_0_and_1(name, rate):
         Rates(**{name: rate})
 
 
+@pytest.mark.parametrize("name", ["slip", "wrong", "repeat", "share"])
+def test_only_slips_after_slips_may_have_no_rate(name):
+    assert Rates(slip_again=None).slips == (0.01, 0.01)
+    with pytest.raises(InvalidInputError, match=f"rate {name}: None"):
+        Rates(**{name: None})
+
+
 def test_a_structure_that_is_nearly_right_is_not_believed_beside_the_right_one():
     # What an action does to a prism's sides depends on whether it stands, so that no permutation of few registers
     # explains it without taking every sixth look for an error; with two modes each look is explained.

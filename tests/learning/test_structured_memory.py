@@ -106,6 +106,7 @@ def test_what_is_no_trial_is_refused(memory, detections, actions, message):
         (lambda s: s.update(seed=-1), "structure.seed: -1"),
         (lambda s: s["rates"].update(slip=2.0), "structure.rates: rate slip: 2.0; expected a number between 0 and 1"),
         (lambda s: s["rates"].pop("share"), "structure.rates: key 'share' is missing"),
+        (lambda s: s["rates"].update(slip=None), "structure.rates: rate slip: None; expected a number between 0 and 1"),
         (lambda s: s.update(candidates={}), "structure.candidates: {}; expected a list"),
         (lambda s: s.update(candidates=s["candidates"] * 11), "expected at most 10"),
         (lambda s: s["candidates"][0]["sources"].pop("flip"), r"candidates\[0\].sources: key 'flip' is missing"),
