@@ -6,13 +6,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.inference.kernels.compilation import compiled, compiled_within, written_out
+from atg_fg.inference.kernels.compilation import NONE, ZERO, compiled, compiled_within, written_out
 from atg_fg.learning.kernels import TrialArrays, copy_into, draw_by_logarithm, shuffled
 
 #: Maps whose evidence is at hand, 2 to the power of this: a later one takes the place of an earlier one.
 _KNOWN_BITS = 13
-#: Entries of the table of histories: it begins anew when it is full.
-_N_ENTRIES = 1 << 17
+#: Histories whose evidence is at hand, 2 to the power of this.
+_HISTORY_BITS = 16
+#: Maps that are followed side by side: of each, a place has so many bits of one number.
+_LANES, _LANE_BITS, _LANE = 8, np.uint64(8), np.uint64(0xFF)
+_EVERY_LANE = np.uint64(0x0101010101010101)
+#: Of two numbers this far apart the smaller adds nothing to ln (exp + exp).
+_NOTHING = 40.0
 #: The sources of an action in one number, four bits each; fewer than 16 registers never have the last one.
 _MAX_REGISTERS, _NO_ACTION = 15, 2**64 - 1
 #: An odd number without a pattern, whose multiples spread over all numbers.
@@ -21,16 +26,23 @@ _SPREAD = np.uint64(0x9E3779B97F4A7C15)
 #: Without a sign: nobody asks of each index whether it counts from the end.
 Indices = NDArray[np.uint32]
 Codes = NDArray[np.uint64]
-#: What a register has shown in a trial so far, each history once, the empty one first: which of the different looks
-#: each one was [N, T, J], these looks [L, V], the history that each look makes of each, 0 if not known yet [H, L],
-#: prior · Π likelihoods [H, V], ln of its sum [H], and how many are known [1]. Maps differ in which registers are
-#: where, so that few histories come again and again.
-Histories = tuple[Indices, FloatArray, Indices, FloatArray, FloatArray, Indices]
+#: What a register shows in a trial is a sum of names: which of the different looks each slot has at each time
+#: [N, T, J], these looks [L, V], their names [L], p(symbol) of a register [V], and the sums whose evidence is at hand
+#: [H], with ln Σ prior · Π likelihoods of each [H]. A later one takes the place of an earlier one. Maps differ in which
+#: registers are where, so that few sums come again and again. Names have 64 bits that look random: different looks next
+#: to never have the same sum.
+Histories = tuple[Indices, FloatArray, Codes, FloatArray, Codes, FloatArray]
 #: Trials of fresh objects: actions [N, T], lengths [N], ln p(trial | it follows no maps) [N], −∞ if all do, histories.
 FreshTrials = tuple[Indices, IntArray, FloatArray, Histories]
 #: Maps of as many registers, each action's sources as one number [M, A], their evidence [M], and how many actions lose
 #: content [M].
 KnownMaps = tuple[Codes, FloatArray, IntArray]
+#: What a register may do next to its source: another register that moves, too, and the new sources of the first and of
+#: the other, each of shape [M].
+Moves = tuple[Indices, Indices, Indices]
+#: Room for the register in each place at each look, in all lanes [T, P], and what each has shown, in each [lanes, P];
+#: for the looks that one register has shown [T · J + 1], and the product of their likelihoods [V].
+Work = tuple[Codes, Codes, Indices, FloatArray]
 
 
 @compiled
@@ -48,18 +60,24 @@ def no_maps(n_actions: int) -> KnownMaps:
 @compiled
 def map_log_evidence(fresh: FreshTrials, sources: IntArray) -> float:
     """Return Σ ln (p(trial | a fresh object that begins in pose 0) + p(trial | plain)) of register maps [A, P]."""
-    return evidence_of(sources.astype(np.uint32), fresh, room_for(fresh, sources.shape[1]))
+    now, result = sources.astype(np.uint32), np.empty(1)
+    stays = now[0, :1]
+    nothing_moves = np.zeros(1, np.uint32), stays, stays
+    evidence_after(now, ZERO, ZERO, nothing_moves, np.zeros(1, np.int64), fresh, room_for(fresh, now.shape[1]), result)
+    return float(result[0])
 
 
 @compiled_within
-def room_for(fresh: FreshTrials, n_registers: int) -> tuple[Indices, Indices]:
-    """Return room for the register in each place at each look, and for what each register has shown."""
-    return np.empty((fresh[3][0].shape[1] + 1, n_registers), np.uint32), np.empty(n_registers, np.uint32)
+def room_for(fresh: FreshTrials, n_registers: int) -> Work:
+    """Return room for the register in each place at each look, and for what each register has shown, by lane."""
+    _, n_looks, n_slots = fresh[3][0].shape
+    places, history = np.empty((n_looks, n_registers), np.uint64), np.empty((_LANES, n_registers), np.uint64)
+    return places, history, np.empty(n_looks * n_slots + 1, np.uint32), np.empty(fresh[3][1].shape[1])
 
 
 @compiled_within
 def histories_of(looks: FloatArray, n_slots: int, prior: FloatArray) -> Histories:
-    """Return histories of which none is known but the empty one."""
+    """Return histories of which none is known."""
     n_trials, n_looks, n_symbols = len(looks), looks.shape[1], len(prior)
     number = np.empty((n_trials, n_looks, n_slots), np.uint32)
     rows, n_rows = np.empty((number.size, n_symbols)), 0
@@ -77,52 +95,114 @@ def histories_of(looks: FloatArray, n_slots: int, prior: FloatArray) -> Historie
                         rows[row, symbol] = looks[trial, time, slot, symbol]
                     n_rows += 1
                 number[trial, time, slot] = row
-    capacity = 2 * n_looks * n_slots + _N_ENTRIES // n_rows
-    longer, product = np.empty((capacity, n_rows), np.uint32), np.empty((capacity, n_symbols))
-    log_evidence, n_known = np.zeros(capacity), np.ones(1, np.uint32)
-    longer[0] = 0
-    for symbol in range(n_symbols):
-        product[0, symbol] = prior[symbol]
-    return number, rows, longer, product, log_evidence, n_known
+    names, n_known = np.empty(n_rows, np.uint64), 1 << _HISTORY_BITS
+    for row in range(n_rows):
+        names[row] = spread(np.uint64(row + 1))
+    return number, rows, names, prior, np.zeros(n_known, np.uint64), np.zeros(n_known)
 
 
-@written_out
-def evidence_of(sources: Indices, fresh: FreshTrials, work: tuple[Indices, Indices]) -> float:
-    """Return what ``map_log_evidence`` does, and add what registers showed to the histories that are known."""
-    actions, lengths, plain, (number, rows, longer, product, log_evidence, n_known) = fresh
-    n_registers, n_slots = sources.shape[1], number.shape[2]
-    places, history = work
-    total = 0.0
+@compiled_within
+def spread(number: np.uint64) -> np.uint64:
+    """Return 64 bits that look random (the finaliser of SplitMix64; Steele, Lea & Flood 2014)."""
+    bits = number * _SPREAD
+    bits = (bits ^ (bits >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    bits = (bits ^ (bits >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return bits ^ (bits >> np.uint64(31))
+
+
+@compiled_within
+def evidence_after(
+    sources: Indices,
+    action: int,
+    register: int,
+    moves: Moves,
+    lanes: IntArray,
+    fresh: FreshTrials,
+    work: Work,
+    result: FloatArray,
+) -> None:
+    """Fill in what ``map_log_evidence`` is of the maps after some moves, and add to the histories at hand.
+
+    Args:
+        sources: Before the moves, shape [A, P].
+        action: Whose sources move.
+        register: That moves.
+        moves: All that it can make, shape [M].
+        lanes: Numbers of some of them, at most ``_LANES``.
+        fresh: Trials of fresh objects.
+        work: Of ``room_for``.
+        result: Of each move, shape [M].
+    """
+    actions, lengths, plain, (number, _, names, _, known, log_evidence) = fresh
+    others, first, second = moves
+    places, history, shown_looks, product = work
+    n_registers, n_lanes = sources.shape[1], len(lanes)
+    for lane in range(n_lanes):
+        result[lanes[lane]] = 0.0
     for trial in range(len(lengths)):
-        if n_known[0] + number.shape[1] * n_slots > len(longer):
-            n_known[0], longer[0] = 1, 0
-        for register in range(n_registers):
-            places[0, register], history[register] = register, 0
+        for place in range(n_registers):
+            places[0, place] = np.uint64(place) * _EVERY_LANE
+            for lane in range(n_lanes):
+                history[lane, place] = _SPREAD
         for time in range(lengths[trial]):
-            action = actions[trial, time]
-            for register in range(n_registers):
-                places[time + 1, register] = places[time, sources[action, register]]
-            for slot in range(n_slots):
-                register, row = places[time, slot], number[trial, time, slot]
-                before = history[register]
-                after = longer[before, row]
-                if after == 0:
-                    after = n_known[0]
-                    n_known[0] += 1
-                    longer[before, row] = after
-                    evidence = 0.0
-                    for symbol in range(rows.shape[1]):
-                        product[after, symbol] = product[before, symbol] * rows[row, symbol]
-                        evidence += product[after, symbol]
-                    log_evidence[after] = np.log(max(evidence, 1e-300))
-                    for look in range(longer.shape[1]):
-                        longer[after, look] = 0
-                history[register] = after
-        evidence = 0.0
-        for register in range(n_registers):
-            evidence += log_evidence[history[register]]
-        total += evidence if plain[trial] == -np.inf else np.logaddexp(evidence, plain[trial])
-    return total
+            if time > 0:
+                done = actions[trial, time - 1]
+                for place in range(n_registers):
+                    places[time, place] = places[time - 1, sources[done, place]]
+                if done == action:
+                    for lane in range(n_lanes):
+                        move, mine = lanes[lane], _LANE << (_LANE_BITS * np.uint64(lane))
+                        other = others[move]
+                        places[time, register] &= ~mine
+                        places[time, register] |= places[time - 1, first[move]] & mine
+                        places[time, other] &= ~mine
+                        places[time, other] |= places[time - 1, second[move]] & mine
+            for slot in range(number.shape[2]):
+                shown, name = places[time, slot], names[number[trial, time, slot]]
+                for lane in range(n_lanes):
+                    history[lane, shown & _LANE] += name
+                    shown >>= _LANE_BITS
+        for lane in range(n_lanes):
+            evidence = 0.0
+            for place in range(n_registers):
+                name = history[lane, place]
+                row = (name * _SPREAD) >> np.uint64(64 - _HISTORY_BITS)
+                if known[row] != name:
+                    known[row] = name
+                    shift = _LANE_BITS * np.uint64(lane)
+                    looks = number[trial, : lengths[trial]]
+                    log_evidence[row] = log_evidence_of(place, shift, looks, fresh[3], places, shown_looks, product)
+                evidence += log_evidence[row]
+            most, least = max(evidence, plain[trial]), min(evidence, plain[trial])
+            result[lanes[lane]] += most if most - least > _NOTHING else np.logaddexp(most, least)
+
+
+@compiled_within
+def log_evidence_of(
+    register: int,
+    shift: np.uint64,
+    looks: Indices,
+    histories: Histories,
+    places: Codes,
+    shown: Indices,
+    product: FloatArray,
+) -> float:
+    """Return ln of how probable it is that a register shows what it does in a trial, in the lane with this shift."""
+    _, rows, _, prior, _, _ = histories
+    n_shown = 0
+    for time in range(len(looks)):
+        for slot in range(looks.shape[1]):
+            shown[n_shown] = looks[time, slot]
+            n_shown += (places[time, slot] >> shift) & _LANE == register
+    for symbol in range(len(product)):
+        product[symbol] = prior[symbol]
+    for look in range(n_shown):
+        for symbol in range(len(product)):
+            product[symbol] *= rows[shown[look], symbol]
+    total = 0.0
+    for symbol in range(len(product)):
+        total += product[symbol]
+    return float(np.log(max(total, 1e-300)))
 
 
 @compiled
@@ -149,56 +229,118 @@ def anneal_maps(
         copy_cost: What each action that does so costs, in nats.
         rng: Draws.
     """
-    codes, evidence, losses = known
     n_actions, n_registers = sources.shape
-    now, code, unit = sources.astype(np.uint32), np.zeros(n_actions, np.uint64), np.ones(n_registers, np.uint64)
-    for register in range(n_registers):
-        unit[register] <<= np.uint64(4 * (register % 16))
-        for action in range(n_actions):
-            code[action] += now[action, register] * unit[register]
-    best, kept, work = -np.inf, now.copy(), room_for(fresh, n_registers)
-    n_options = 2 * n_registers if copies else n_registers
-    scores, coded = np.empty(n_options), np.empty(n_options, np.uint64)
+    n_moves = 2 * n_registers if copies else n_registers
+    now, kept, best, work = sources.astype(np.uint32), sources.astype(np.uint32), -np.inf, room_for(fresh, n_registers)
+    moves = np.empty(n_moves, np.uint32), np.empty(n_moves, np.uint32), np.empty(n_moves, np.uint32)
+    code, coded = np.zeros(n_actions, np.uint64), np.empty(n_moves, np.uint64)
+    tried = np.empty(n_moves, np.int64), np.empty(n_moves, np.uint64)
+    for action in range(n_actions):
+        for register in range(n_registers):
+            code[action] += in_code(register, now[action, register])
+    # What moves lead to is as it was when a register was last looked at, if none was made since then.
+    scores, looked_at, n_made = np.empty((n_actions, n_registers, n_moves)), np.full((n_actions, n_registers), NONE), 0
     for beta in coldness:
         for action in range(n_actions):
             for register in shuffled(n_registers, rng):
-                mine, before = now[action, register], code[action]
-                for option in range(n_options):
-                    other = option if option < n_registers else option - n_registers
-                    theirs = now[action, other]
-                    if option < n_registers:
-                        now[action, register], now[action, other] = theirs, mine
-                        coded[option] = before + (np.uint64(theirs) - np.uint64(mine)) * (unit[register] - unit[other])
-                    else:
-                        now[action, register] = other
-                        coded[option] = before + (np.uint64(other) - np.uint64(mine)) * unit[register]
-                    code[action] = coded[option]
-                    # Once a chain is cold, most maps that it looks at are those that it looked at before.
-                    key, is_known = np.uint64(0), n_registers <= _MAX_REGISTERS
-                    for row in range(n_actions):
-                        key = (key + code[row]) * _SPREAD
-                    number = key >> np.uint64(64 - _KNOWN_BITS)
-                    for row in range(n_actions):
-                        is_known = is_known and codes[number, row] == code[row]
-                    if not is_known:
-                        for row in range(n_actions):
-                            codes[number, row] = code[row]
-                        evidence[number] = evidence_of(now, fresh, work)
-                        losses[number] = count_losses(now) if copies else 0
-                    scores[option] = evidence[number] - copy_cost * losses[number]
-                    if scores[option] > best:
-                        best = scores[option]
+                list_moves(now, code, action, register, moves, coded)
+                own = scores[action, register]
+                if looked_at[action, register] != n_made:
+                    score_moves(now, code, action, register, moves, coded, fresh, known, tried, work, copy_cost, own)
+                    looked_at[action, register] = n_made
+                    if own.max() > best:
+                        best = own.max()
                         copy_into(kept, now)
-                    now[action, other], now[action, register] = theirs, mine
-                option = draw_by_logarithm(scores, beta, rng)
-                code[action] = coded[option]
-                other = option if option < n_registers else option - n_registers
-                if option < n_registers:
-                    now[action, register], now[action, other] = now[action, other], mine
-                else:
-                    now[action, register] = other
+                        make(kept, action, register, moves, own.argmax())
+                move = draw_by_logarithm(own, beta, rng)
+                make(now, action, register, moves, move)
+                n_made += coded[move] != code[action]
+                code[action] = coded[move]
     copy_into(sources, kept)
     return best
+
+
+@compiled_within
+def in_code(register: int, source: int) -> np.uint64:
+    """Return what the source of a register adds to the code of an action."""
+    return np.uint64(source) << np.uint64(4 * (register % 16))
+
+
+@written_out
+def list_moves(sources: Indices, code: Codes, action: int, register: int, moves: Moves, coded: Codes) -> None:
+    """Fill in swaps with each register, then, if there is room, copies of each, and the action's code after each."""
+    others, first, second = moves
+    n_registers, mine = sources.shape[1], sources[action, register]
+    rest = code[action] - in_code(register, mine)
+    for move in range(len(first)):
+        if move < n_registers:
+            others[move], first[move], second[move] = move, sources[action, move], mine
+            coded[move] = rest + in_code(register, first[move]) + in_code(move, mine) - in_code(move, first[move])
+        else:
+            others[move], first[move], second[move] = register, move - n_registers, move - n_registers
+            coded[move] = rest + in_code(register, first[move])
+    coded[register] = code[action]
+
+
+@written_out
+def score_moves(
+    sources: Indices,
+    code: Codes,
+    action: int,
+    register: int,
+    moves: Moves,
+    coded: Codes,
+    fresh: FreshTrials,
+    known: KnownMaps,
+    tried: tuple[IntArray, Codes],
+    work: Work,
+    copy_cost: float,
+    scores: FloatArray,
+) -> None:
+    """Fill in the evidence of the maps after each move, less what actions cost that lose content.
+
+    Once a chain is cold, most maps that it looks at are those that it looked at before.
+    """
+    codes, evidence, losses = known
+    missing, numbers = tried
+    before, n_missing = code[action], 0
+    for move in range(len(scores)):
+        code[action] = coded[move]
+        key, is_known = np.uint64(0), sources.shape[1] <= _MAX_REGISTERS
+        for row in range(len(code)):
+            key = (key + code[row]) * _SPREAD
+        number = key >> np.uint64(64 - _KNOWN_BITS)
+        for row in range(len(code)):
+            is_known = is_known and codes[number, row] == code[row]
+        numbers[move] = number
+        scores[move] = evidence[number] - copy_cost * losses[number]
+        if not is_known:
+            missing[n_missing] = move
+            n_missing += 1
+    for begin in range(0, n_missing, _LANES):
+        lanes = missing[begin : min(begin + _LANES, n_missing)]
+        evidence_after(sources, action, register, moves, lanes, fresh, work, scores)
+    for move in missing[:n_missing]:
+        number, code[action] = numbers[move], coded[move]
+        for row in range(len(code)):
+            codes[number, row] = code[row]
+        evidence[number], losses[number] = scores[move], 0
+        if copy_cost > 0:
+            other = moves[0][move]
+            mine, theirs = sources[action, register], sources[action, other]
+            make(sources, action, register, moves, move)
+            losses[number] = count_losses(sources)
+            sources[action, other], sources[action, register] = theirs, mine
+            scores[move] -= copy_cost * losses[number]
+    code[action] = before
+
+
+@compiled_within
+def make(sources: Indices, action: int, register: int, moves: Moves, move: int) -> None:
+    """Make one of the moves of a register."""
+    others, first, second = moves
+    sources[action, register] = first[move]
+    sources[action, others[move]] = second[move]
 
 
 @compiled_within

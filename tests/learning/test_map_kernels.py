@@ -1,5 +1,7 @@
 """Register maps against the states that they lead through: a ring of three registers, of which one is seen."""
 
+import itertools
+
 import numpy as np
 import pytest
 
@@ -40,3 +42,29 @@ def test_annealed_maps_find_the_ring():
     truth = map_kernels.map_log_evidence(fresh, np.array([[1, 2, 0], [1, 0, 2]]))
     assert found >= truth - 1e-9
     assert found == pytest.approx(map_kernels.map_log_evidence(fresh, sources))
+
+
+@pytest.mark.parametrize("copies", [False, True])
+def test_no_move_betters_what_a_cold_chain_ends_in(copies):
+    """Six registers, two seen, half of the trials likelier plain; each neighbour's evidence is summed up anew."""
+    rng = np.random.default_rng(9)
+    labels, n_registers, cost = rng.integers(0, 3, size=(8, 7, 2)), 6, 0.7
+    looks = np.where(labels[..., None] == np.arange(3), 0.9, 0.05)
+    plain = np.where(np.arange(8) % 2, -12.0, -200.0)
+    trials = TrialArrays(looks, rng.integers(0, 2, size=(8, 7)), rng.integers(4, 8, size=8))
+
+    def worth(sources):
+        n_losses = sum(len(set(each)) < n_registers for each in sources.tolist())
+        fresh = map_kernels.fresh_trials(trials, plain, 2, PRIOR)
+        return map_kernels.map_log_evidence(fresh, sources) - cost * n_losses
+
+    sources = np.array([rng.permutation(n_registers) for _ in range(2)])
+    fresh, known = map_kernels.fresh_trials(trials, plain, 2, PRIOR), map_kernels.no_maps(2)
+    best = map_kernels.anneal_maps(fresh, known, sources, np.array([0.5, *[100.0] * 9]), copies, cost * copies, rng)
+    assert best == pytest.approx(worth(sources), abs=1e-9)
+    for action, register, other in itertools.product(range(2), range(n_registers), range(n_registers)):
+        swapped, copied = sources.copy(), sources.copy()
+        swapped[action, [register, other]] = swapped[action, [other, register]]
+        copied[action, register] = other
+        assert worth(swapped) <= best + 1e-9
+        assert not copies or worth(copied) <= best + 1e-9
