@@ -8,17 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.inference.kernels.compilation import compiled, compiled_within, written_out
+from atg_fg.inference.kernels.compilation import NONE, compiled, written_out
 from atg_fg.learning.gibbs_kernels import count_votes, log_total, put_in, take_out
-from atg_fg.learning.kernels import SMALL, Clusters, TrialArrays, copy_into, draw_by_logarithm
+from atg_fg.learning.kernels import Clusters, TrialArrays, copy_into, draw_by_logarithm
 from atg_fg.learning.object_kernels import cluster_weights
 from atg_fg.learning.weight_kernels import side_by_side, sum_products, trial_weights
 
 #: Paths with slips that are followed at once, and how improbable one may be beside the best.
 _MAX_PATHS = 256
 _LEAST_PATH = 1e-7
-#: Products of so many times the greatest may be the greatest but for rounding.
-_AS_GOOD = 1.0 - 1e-9
 
 
 @compiled
@@ -71,27 +69,31 @@ class Paths(NamedTuple):
         slipped: Whether each action failed, shape [B, T].
         start: First state, shape [B].
         log_prior: ln of the slips' probability, shape [B].
+        state: Where each path is, shape [B].
+        shown: What each register has shown on each path, as a history, shape [B, R].
     """
 
     slipped: NDArray[np.bool_]
     start: IntArray
     log_prior: FloatArray
+    state: IntArray
+    shown: IntArray
 
 
-class _Work(NamedTuple):
-    """What is followed along each path. A path keeps its row of the large tables when others are forgotten.
+class _Histories(NamedTuple):
+    """What a register may have shown, each history once: many paths come to the same. The first ones showed nothing.
 
     Attributes:
-        row: Of each path, and those that are free, shape [B].
-        state: Where each path is, shape [B].
-        local: Likelihood of each symbol in each register, by row, shape [B, R, V].
-        totals: Σ_c table(r, c) local(r, c) of each cluster side by side, by row, shape [B, R, K].
+        likelihood: Of each symbol in the register, shape [E, V].
+        log_totals: ln Σ_c table(r, c) likelihood(c) of each cluster side by side, shape [E, K].
+        longer: The history that a slot makes of it at the last time that it did, shape [E, J].
+        time: That time, shape [E, J].
     """
 
-    row: IntArray
-    state: IntArray
-    local: FloatArray
-    totals: FloatArray
+    likelihood: FloatArray
+    log_totals: FloatArray
+    longer: IntArray
+    time: IntArray
 
 
 @compiled
@@ -119,104 +121,134 @@ def slip_paths(
         The paths and ln p(trial, path | cluster), shape [B, C].
     """
     members, tables = side_by_side(clusters, free)
-    n_states, length = len(clusters.registers), trials.lengths[trial]
-    capacity, n_paths = max(2 * _MAX_PATHS, n_states), n_states
-    paths = Paths(np.zeros((capacity, max(length, 1)), np.bool_), np.arange(capacity), np.zeros(capacity))
-    work = _Work(
+    n_states, length, (n_registers, n_symbols, n_members) = len(clusters.registers), trials.lengths[trial], tables.shape
+    capacity, n_slots, n_paths = max(2 * _MAX_PATHS, n_states), clusters.registers.shape[1], n_states
+    paths = Paths(
+        np.zeros((capacity, max(length, 1)), np.bool_),
         np.arange(capacity),
+        np.zeros(capacity),
         np.arange(capacity),
-        np.ones((capacity, tables.shape[0], tables.shape[1])),
-        np.ones((capacity, tables.shape[0], len(members))),
+        np.empty((capacity, n_registers), np.int64),
     )
-    prior, best = np.empty(len(members)), np.empty(capacity)
-    for number in range(len(members)):
+    for register in range(n_registers):
+        paths.shown[:, register] = register
+    room = capacity * (n_registers + n_slots)
+    histories = _Histories(
+        np.empty((room, n_symbols)),
+        np.empty((room, n_members)),
+        np.empty((room, n_slots), np.int64),
+        np.full((room, n_slots), NONE),
+    )
+    histories.likelihood[:n_registers] = 1.0
+    histories.log_totals[:n_registers] = 0.0
+    prior, best, n_known = np.empty(n_members), np.empty(capacity), n_registers
+    for number in range(n_members):
         prior[number] = all_prior[members[number]]
-    weights = np.exp(prior - prior.max())
+    scores = np.empty((capacity, n_members))
     for time in range(length):
         if time > 0:
-            n_paths = branch(paths, work, n_paths, time, clusters.successors[0, done[time - 1]], log_odds)
+            n_paths = branch(paths, n_paths, time, clusters.successors[0, done[time - 1]], log_odds)
+        if n_known + n_paths * n_slots > room:
+            n_known = keep(paths, n_paths, histories, n_known)
         for path in range(n_paths):
-            take_in_look(trials, trial, time, clusters.registers, tables, work, path)
-            best[path] = best_score(work, path, paths.log_prior[path], prior, weights)
-        n_paths = drop(paths, work, best[:n_paths])
-    scores = np.full((n_paths, len(clusters.n_trials)), -np.inf)
+            n_known = take_in_look(trials, trial, time, clusters.registers, tables, paths, path, histories, n_known)
+            score_path(paths, path, histories, prior, scores[path])
+            best[path] = scores[path].max()
+        n_paths = drop(paths, scores, best[:n_paths])
+    found = np.full((n_paths, len(clusters.n_trials)), -np.inf)
     for path in range(n_paths):
-        for number in range(len(members)):
-            scores[path, members[number]] = score_of(work, path, number, paths.log_prior[path], prior)
-    return Paths(paths.slipped[:n_paths].copy(), paths.start[:n_paths].copy(), paths.log_prior[:n_paths].copy()), scores
+        for number in range(n_members):
+            found[path, members[number]] = scores[path, number]
+    slipped, start, log_prior, state, shown = paths
+    return Paths(slipped[:n_paths], start[:n_paths], log_prior[:n_paths], state[:n_paths], shown[:n_paths]), found
 
 
 @written_out
-def branch(paths: Paths, work: _Work, n_paths: int, time: int, successors: IntArray, log_odds: float) -> int:
+def branch(paths: Paths, n_paths: int, time: int, successors: IntArray, log_odds: float) -> int:
     """Let each path go on, and leave another behind for a slip; return how many there are then."""
     log_slip, log_stay = log_odds - np.log1p(np.exp(log_odds)), -np.log1p(np.exp(log_odds))
-    n_old, slipped, state, row = n_paths, paths.slipped, work.state, work.row
+    n_old, (slipped, start, log_prior, state, shown) = n_paths, paths
     for path in range(n_old):
-        if n_paths == len(row):
+        if n_paths == len(state):
             break
-        state[n_paths], paths.start[n_paths] = state[path], paths.start[path]
-        paths.log_prior[n_paths] = paths.log_prior[path] + log_slip
+        state[n_paths], start[n_paths], log_prior[n_paths] = state[path], start[path], log_prior[path] + log_slip
         for earlier in range(time - 1):
             slipped[n_paths, earlier] = slipped[path, earlier]
         slipped[n_paths, time - 1] = True
-        copy_into(work.local[row[n_paths]], work.local[row[path]])
-        copy_into(work.totals[row[n_paths]], work.totals[row[path]])
+        for register in range(shown.shape[1]):
+            shown[n_paths, register] = shown[path, register]
         n_paths += 1
     for path in range(n_old):
         state[path] = successors[state[path]]
-        paths.log_prior[path] += log_stay
+        log_prior[path] += log_stay
     return n_paths
 
 
 @written_out
 def take_in_look(
-    trials: TrialArrays, trial: int, time: int, registers: IntArray, tables: FloatArray, work: _Work, path: int
-) -> None:
-    """Multiply a look into the registers that a path shows, and sum over symbols for all clusters side by side."""
-    looks, local, row, state = trials.looks, work.local, work.row[path], work.state[path]
+    trials: TrialArrays,
+    trial: int,
+    time: int,
+    registers: IntArray,
+    tables: FloatArray,
+    paths: Paths,
+    path: int,
+    histories: _Histories,
+    n_known: int,
+) -> int:
+    """Have the registers that a path shows go on to longer histories; return how many histories are known then."""
+    likelihood, log_totals, longer, at = histories
+    looks, shown, state = trials.looks, paths.shown, paths.state[path]
     for slot in range(registers.shape[1]):
         register = registers[state, slot]
-        for symbol in range(tables.shape[1]):
-            local[row, register, symbol] *= looks[trial, time, slot, symbol]
-        sum_products(tables, register, local[row], register, work.totals, row)
+        before = shown[path, register]
+        if at[before, slot] != time:
+            at[before, slot], longer[before, slot] = time, n_known
+            at[n_known] = NONE
+            for symbol in range(tables.shape[1]):
+                likelihood[n_known, symbol] = likelihood[before, symbol] * looks[trial, time, slot, symbol]
+            sum_products(tables, register, likelihood[n_known], log_totals[n_known])
+            for number in range(tables.shape[2]):
+                log_totals[n_known, number] = np.log(max(log_totals[n_known, number], 1e-300))
+            n_known += 1
+        shown[path, register] = longer[before, slot]
+    return n_known
 
 
 @written_out
-def best_score(work: _Work, path: int, log_prior: float, prior: FloatArray, weights: FloatArray) -> float:
-    """Return the greatest of the scores of a path, over clusters.
-
-    A logarithm takes longer than all else: it is taken for the clusters alone that may be the best.
-
-    Args:
-        work: What is followed.
-        path: Which one.
-        log_prior: Of its slips.
-        prior: Ln of what each cluster weighs, shape [K].
-        weights: The same as a factor, shape [K].
-    """
-    totals, row, products = work.totals, work.row[path], weights.copy()
-    for register in range(totals.shape[1]):
-        for number in range(len(products)):
-            products[number] *= totals[row, register, number]
-    most, result = products.max(), -np.inf
-    least = most * _AS_GOOD if SMALL < most < 1.0 / SMALL else -1.0
-    for number in range(len(products)):
-        if products[number] >= least:
-            result = max(result, score_of(work, path, number, log_prior, prior))
-    return result
-
-
-@compiled_within
-def score_of(work: _Work, path: int, number: int, log_prior: float, prior: FloatArray) -> float:
-    """Return ln p(trial, path | cluster)."""
-    score = log_prior + prior[number]
-    for register in range(work.totals.shape[1]):
-        score += np.log(max(work.totals[work.row[path], register, number], 1e-300))
-    return float(score)
+def keep(paths: Paths, n_paths: int, histories: _Histories, n_known: int) -> int:
+    """Forget histories that no path has any more; return how many are left."""
+    number, n_left = np.full(n_known, NONE), 0
+    for path in range(n_paths):
+        for register in range(paths.shown.shape[1]):
+            number[paths.shown[path, register]] = 0
+    for history in range(n_known):
+        if number[history] == 0:
+            number[history] = n_left
+            histories.likelihood[n_left] = histories.likelihood[history]
+            histories.log_totals[n_left] = histories.log_totals[history]
+            histories.time[n_left] = NONE
+            n_left += 1
+    for path in range(n_paths):
+        for register in range(paths.shown.shape[1]):
+            paths.shown[path, register] = number[paths.shown[path, register]]
+    return n_left
 
 
 @written_out
-def drop(paths: Paths, work: _Work, best: FloatArray) -> int:
+def score_path(paths: Paths, path: int, histories: _Histories, prior: FloatArray, scores: FloatArray) -> None:
+    """Fill in ln p(trial so far, path | cluster) of each cluster side by side, shape [K]."""
+    log_prior, shown, log_totals = paths.log_prior[path], paths.shown, histories.log_totals
+    for number in range(len(prior)):
+        scores[number] = log_prior + prior[number]
+    for register in range(shown.shape[1]):
+        history = shown[path, register]
+        for number in range(len(prior)):
+            scores[number] += log_totals[history, number]
+
+
+@written_out
+def drop(paths: Paths, scores: FloatArray, best: FloatArray) -> int:
     """Forget paths that are negligible beside the best; return how many are left. These are in order, best first."""
     n_paths, least, n_kept = len(best), best.max() + np.log(_LEAST_PATH), 0
     for path in range(n_paths):
@@ -224,14 +256,14 @@ def drop(paths: Paths, work: _Work, best: FloatArray) -> int:
     if n_kept == n_paths <= _MAX_PATHS:
         return n_paths
     n_kept = min(n_kept, _MAX_PATHS)
-    kept = np.argsort(-best)
-    state, row, start, log_prior = work.state[kept], work.row[kept], paths.start[kept], paths.log_prior[kept]
-    slipped = paths.slipped[kept[:n_kept]]
-    for path in range(n_paths):
-        work.row[path] = row[path]
+    kept = np.argsort(-best)[:n_kept]
+    slipped, start, log_prior, state, shown = paths
+    copy_into(slipped, slipped[kept])
+    copy_into(shown, shown[kept])
+    copy_into(scores, scores[kept])
+    new_start, new_prior, new_state = start[kept], log_prior[kept], state[kept]
     for path in range(n_kept):
-        work.state[path], paths.start[path], paths.log_prior[path] = state[path], start[path], log_prior[path]
-    copy_into(paths.slipped, slipped)
+        start[path], log_prior[path], state[path] = new_start[path], new_prior[path], new_state[path]
     return n_kept
 
 

@@ -85,7 +85,7 @@ def weigh_sharing(trials: TrialArrays, trial: int, clusters: Clusters, free: int
                 register = visited[start, visit]
                 if not is_known[visit, register]:
                     is_known[visit, register] = True
-                    sum_products(tables, register, local, visited[first, visit], factors, visit)
+                    sum_products(tables, register, local[visited[first, visit]], factors[visit, register])
                 for number in range(len(members)):
                     product[number] *= factors[visit, register, number]
                 for number in range(len(members)):
@@ -137,13 +137,11 @@ def number_visits(path: IntArray, length: int, registers: IntArray, visits: IntA
 
 
 @compiled_within
-def sum_products(
-    tables: FloatArray, register: int, local: FloatArray, local_register: int, factors: FloatArray, visit: int
-) -> None:
+def sum_products(tables: FloatArray, register: int, local: FloatArray, totals: FloatArray) -> None:
     """Fill in Σ_c table(register, c) · local(c) of all clusters side by side, shape [K]."""
     for number in range(tables.shape[2]):
-        factors[visit, register, number] = 0.0
+        totals[number] = 0.0
     for symbol in range(tables.shape[1]):
-        likelihood = local[local_register, symbol]
+        likelihood = local[symbol]
         for number in range(tables.shape[2]):
-            factors[visit, register, number] += tables[register, symbol, number] * likelihood
+            totals[number] += tables[register, symbol, number] * likelihood

@@ -151,6 +151,23 @@ def test_paths_with_slips_are_all_there_and_weigh_what_enumeration_says():
         assert found[start, slips][1] == pytest.approx(prior - 0.3 + np.log(novel), abs=1e-12)
 
 
+def test_paths_of_a_long_trial_weigh_what_each_does_alone():
+    """There are more histories on the way than there is room for: those that no path has any more are forgotten."""
+    trials = drawn_trials(np.random.default_rng(10), n_trials=2, n_looks=90)
+    chain, _ = chain_of(trials, [0, -1], [1, 0])
+    kernels.forget(chain.clusters, 1)
+    prior, stay = object_kernels.cluster_weights(trials, 1, chain.clusters, 1, -0.3), 2
+    done, log_odds = trials.actions[1].copy(), np.log(0.3 / 0.7)
+    paths, scores = slip_kernels.slip_paths(trials, 1, done, chain.clusters, 1, prior, log_odds)
+    assert len(scores) > 100
+    weights = np.zeros((len(chain.clusters.n_trials), 3))
+    for slipped, start, score in zip(paths.slipped, paths.start, scores, strict=True):
+        trials.actions[1] = np.where(slipped, stay, done)
+        weight_kernels.trial_weights(trials, 1, chain.clusters, 1, prior, weights)
+        log_prior = slipped.sum() * np.log(0.3) + (89 - slipped.sum()) * np.log(0.7)
+        assert score == pytest.approx(weights[:, start] + log_prior, abs=1e-9)
+
+
 def simulated(rng, n_trials, n_looks, contents, wrong=0.0):
     """Trials of objects with these contents, one after the other, from random starts."""
     labels = np.zeros((n_trials, n_looks, 1), dtype=np.int64)
