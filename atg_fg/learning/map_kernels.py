@@ -34,15 +34,13 @@ Codes = NDArray[np.uint64]
 Histories = tuple[Indices, FloatArray, Codes, FloatArray, Codes, FloatArray]
 #: Trials of fresh objects: actions [N, T], lengths [N], ln p(trial | it follows no maps) [N], −∞ if all do, histories.
 FreshTrials = tuple[Indices, IntArray, FloatArray, Histories]
-#: Maps of as many registers, each action's sources as one number [M, A], their evidence [M], and how many actions lose
-#: content [M].
-KnownMaps = tuple[Codes, FloatArray, IntArray]
-#: What a register may do next to its source: another register that moves, too, and the new sources of the first and of
-#: the other, each of shape [M].
-Moves = tuple[Indices, Indices, Indices]
+#: Maps of as many registers: each action's sources as one number, and the evidence less what lost content costs
+#: [M, A + 1]; the same as numbers of 64 bits of the one kind, and of the other. A map's columns are fetched together.
+KnownMaps = tuple[Codes, FloatArray]
 #: Room for the register in each place at each look, in all lanes [T, P], and what each has shown, in each [lanes, P];
-#: for the looks that one register has shown [T · J + 1], and the product of their likelihoods [V].
-Work = tuple[Codes, Codes, Indices, FloatArray]
+#: for the looks that one register has shown [T · J + 1], and the product of their likelihoods [V]; for what moves in
+#: each lane next to a register, and the new sources of both [3, lanes].
+Work = tuple[Codes, Codes, Indices, FloatArray, Indices]
 
 
 @compiled
@@ -53,17 +51,15 @@ def fresh_trials(trials: TrialArrays, plain: FloatArray, n_slots: int, prior: Fl
 
 def no_maps(n_actions: int) -> KnownMaps:
     """Return room for known maps."""
-    n_maps = 1 << _KNOWN_BITS
-    return np.full((n_maps, n_actions), _NO_ACTION, np.uint64), np.empty(n_maps), np.empty(n_maps, np.int64)
+    codes = np.full((1 << _KNOWN_BITS, n_actions + 1), _NO_ACTION, np.uint64)
+    return codes, codes.view(np.float64)
 
 
 @compiled
 def map_log_evidence(fresh: FreshTrials, sources: IntArray) -> float:
     """Return Σ ln (p(trial | a fresh object that begins in pose 0) + p(trial | plain)) of register maps [A, P]."""
     now, result = sources.astype(np.uint32), np.empty(1)
-    stays = now[0, :1]
-    nothing_moves = np.zeros(1, np.uint32), stays, stays
-    evidence_after(now, ZERO, ZERO, nothing_moves, np.zeros(1, np.int64), fresh, room_for(fresh, now.shape[1]), result)
+    evidence_after(now, ZERO, ZERO, np.zeros(1, np.int64), fresh, room_for(fresh, now.shape[1]), result)
     return float(result[0])
 
 
@@ -72,7 +68,8 @@ def room_for(fresh: FreshTrials, n_registers: int) -> Work:
     """Return room for the register in each place at each look, and for what each register has shown, by lane."""
     _, n_looks, n_slots = fresh[3][0].shape
     places, history = np.empty((n_looks, n_registers), np.uint64), np.empty((_LANES, n_registers), np.uint64)
-    return places, history, np.empty(n_looks * n_slots + 1, np.uint32), np.empty(fresh[3][1].shape[1])
+    shown, product = np.empty(n_looks * n_slots + 1, np.uint32), np.empty(fresh[3][1].shape[1])
+    return places, history, shown, product, np.empty((3, _LANES), np.uint32)
 
 
 @compiled_within
@@ -115,7 +112,6 @@ def evidence_after(
     sources: Indices,
     action: int,
     register: int,
-    moves: Moves,
     lanes: IntArray,
     fresh: FreshTrials,
     work: Work,
@@ -127,17 +123,16 @@ def evidence_after(
         sources: Before the moves, shape [A, P].
         action: Whose sources move.
         register: That moves.
-        moves: All that it can make, shape [M].
-        lanes: Numbers of some of them, at most ``_LANES``.
+        lanes: Numbers of some moves, at most ``_LANES``, as ``moved`` has them.
         fresh: Trials of fresh objects.
         work: Of ``room_for``.
         result: Of each move, shape [M].
     """
     actions, lengths, plain, (number, _, names, _, known, log_evidence) = fresh
-    others, first, second = moves
-    places, history, shown_looks, product = work
+    places, history, shown_looks, product, moves = work
     n_registers, n_lanes = sources.shape[1], len(lanes)
     for lane in range(n_lanes):
+        moves[0, lane], moves[1, lane], moves[2, lane] = moved(sources[action], register, lanes[lane])
         result[lanes[lane]] = 0.0
     for trial in range(len(lengths)):
         for place in range(n_registers):
@@ -151,12 +146,11 @@ def evidence_after(
                     places[time, place] = places[time - 1, sources[done, place]]
                 if done == action:
                     for lane in range(n_lanes):
-                        move, mine = lanes[lane], _LANE << (_LANE_BITS * np.uint64(lane))
-                        other = others[move]
+                        other, mine = moves[0, lane], _LANE << (_LANE_BITS * np.uint64(lane))
                         places[time, register] &= ~mine
-                        places[time, register] |= places[time - 1, first[move]] & mine
+                        places[time, register] |= places[time - 1, moves[1, lane]] & mine
                         places[time, other] &= ~mine
-                        places[time, other] |= places[time - 1, second[move]] & mine
+                        places[time, other] |= places[time - 1, moves[2, lane]] & mine
             for slot in range(number.shape[2]):
                 shown, name = places[time, slot], names[number[trial, time, slot]]
                 for lane in range(n_lanes):
@@ -232,32 +226,45 @@ def anneal_maps(
     n_actions, n_registers = sources.shape
     n_moves = 2 * n_registers if copies else n_registers
     now, kept, best, work = sources.astype(np.uint32), sources.astype(np.uint32), -np.inf, room_for(fresh, n_registers)
-    moves = np.empty(n_moves, np.uint32), np.empty(n_moves, np.uint32), np.empty(n_moves, np.uint32)
-    code, coded = np.zeros(n_actions, np.uint64), np.empty(n_moves, np.uint64)
-    tried = np.empty(n_moves, np.int64), np.empty(n_moves, np.uint64)
+    code, tried = np.empty(n_actions, np.uint64), (np.empty(n_moves, np.int64), np.empty((2, n_moves), np.uint64))
     for action in range(n_actions):
-        for register in range(n_registers):
-            code[action] += in_code(register, now[action, register])
+        code[action] = code_of(now[action])
     # What moves lead to is as it was when a register was last looked at, if none was made since then.
     scores, looked_at, n_made = np.empty((n_actions, n_registers, n_moves)), np.full((n_actions, n_registers), NONE), 0
     for beta in coldness:
         for action in range(n_actions):
             for register in shuffled(n_registers, rng):
-                list_moves(now, code, action, register, moves, coded)
                 own = scores[action, register]
                 if looked_at[action, register] != n_made:
-                    score_moves(now, code, action, register, moves, coded, fresh, known, tried, work, copy_cost, own)
+                    score_moves(now, code, action, register, fresh, known, tried, work, copy_cost, own)
                     looked_at[action, register] = n_made
                     if own.max() > best:
                         best = own.max()
                         copy_into(kept, now)
-                        make(kept, action, register, moves, own.argmax())
+                        make(kept[action], register, own.argmax())
                 move = draw_by_logarithm(own, beta, rng)
-                make(now, action, register, moves, move)
-                n_made += coded[move] != code[action]
-                code[action] = coded[move]
+                if move != register:
+                    make(now[action], register, move)
+                    code[action] = code_of(now[action])
+                    n_made += 1
     copy_into(sources, kept)
     return best
+
+
+@compiled_within
+def moved(sources: Indices, register: int, move: int) -> tuple[int, int, int]:
+    """Return what else moves when a register does, and the new sources of both: swaps, and then copies, of each."""
+    if move < len(sources):
+        return move, sources[move], sources[register]
+    return register, move - len(sources), move - len(sources)
+
+
+@compiled_within
+def make(sources: Indices, register: int, move: int) -> None:
+    """Make one of the moves of a register."""
+    other, source, other_source = moved(sources, register, move)
+    sources[register] = source
+    sources[other] = other_source
 
 
 @compiled_within
@@ -266,20 +273,13 @@ def in_code(register: int, source: int) -> np.uint64:
     return np.uint64(source) << np.uint64(4 * (register % 16))
 
 
-@written_out
-def list_moves(sources: Indices, code: Codes, action: int, register: int, moves: Moves, coded: Codes) -> None:
-    """Fill in swaps with each register, then, if there is room, copies of each, and the action's code after each."""
-    others, first, second = moves
-    n_registers, mine = sources.shape[1], sources[action, register]
-    rest = code[action] - in_code(register, mine)
-    for move in range(len(first)):
-        if move < n_registers:
-            others[move], first[move], second[move] = move, sources[action, move], mine
-            coded[move] = rest + in_code(register, first[move]) + in_code(move, mine) - in_code(move, first[move])
-        else:
-            others[move], first[move], second[move] = register, move - n_registers, move - n_registers
-            coded[move] = rest + in_code(register, first[move])
-    coded[register] = code[action]
+@compiled_within
+def code_of(sources: Indices) -> np.uint64:
+    """Return the sources of an action as one number."""
+    code = np.uint64(0)
+    for register in range(len(sources)):
+        code += in_code(register, sources[register])
+    return code
 
 
 @written_out
@@ -288,8 +288,6 @@ def score_moves(
     code: Codes,
     action: int,
     register: int,
-    moves: Moves,
-    coded: Codes,
     fresh: FreshTrials,
     known: KnownMaps,
     tried: tuple[IntArray, Codes],
@@ -301,46 +299,46 @@ def score_moves(
 
     Once a chain is cold, most maps that it looks at are those that it looked at before.
     """
-    codes, evidence, losses = known
-    missing, numbers = tried
-    before, n_missing = code[action], 0
+    (codes, known_scores), (missing, numbers) = known, tried
+    own, n_missing = sources[action], 0
+    # A map's place in the table: the top bits of a sum over actions, to which this one adds its share.
+    others, factor, power = np.uint64(0), np.uint64(0), np.uint64(1)
+    for row in range(len(code)):
+        power *= _SPREAD
+        if row == action:
+            factor = power
+        else:
+            others += code[row] * power
+    rest = code[action] - in_code(register, own[register])
     for move in range(len(scores)):
-        code[action] = coded[move]
-        key, is_known = np.uint64(0), sources.shape[1] <= _MAX_REGISTERS
+        other, source, other_source = moved(own, register, move)
+        coded = rest + in_code(register, source)
+        if other != register:
+            coded += in_code(other, other_source) - in_code(other, own[other])
+        number = (others + coded * factor) >> np.uint64(64 - _KNOWN_BITS)
+        is_known = len(own) <= _MAX_REGISTERS
         for row in range(len(code)):
-            key = (key + code[row]) * _SPREAD
-        number = key >> np.uint64(64 - _KNOWN_BITS)
-        for row in range(len(code)):
-            is_known = is_known and codes[number, row] == code[row]
-        numbers[move] = number
-        scores[move] = evidence[number] - copy_cost * losses[number]
+            is_known = is_known and codes[number, row] == (coded if row == action else code[row])
+        numbers[0, move], numbers[1, move] = number, coded
+        scores[move] = known_scores[number, len(code)]
         if not is_known:
             missing[n_missing] = move
             n_missing += 1
     for begin in range(0, n_missing, _LANES):
         lanes = missing[begin : min(begin + _LANES, n_missing)]
-        evidence_after(sources, action, register, moves, lanes, fresh, work, scores)
-    for move in missing[:n_missing]:
-        number, code[action] = numbers[move], coded[move]
+        evidence_after(sources, action, register, lanes, fresh, work, scores)
+    for place in range(n_missing):
+        move = missing[place]
+        number = numbers[0, move]
         for row in range(len(code)):
-            codes[number, row] = code[row]
-        evidence[number], losses[number] = scores[move], 0
+            codes[number, row] = numbers[1, move] if row == action else code[row]
         if copy_cost > 0:
-            other = moves[0][move]
-            mine, theirs = sources[action, register], sources[action, other]
-            make(sources, action, register, moves, move)
-            losses[number] = count_losses(sources)
-            sources[action, other], sources[action, register] = theirs, mine
-            scores[move] -= copy_cost * losses[number]
-    code[action] = before
-
-
-@compiled_within
-def make(sources: Indices, action: int, register: int, moves: Moves, move: int) -> None:
-    """Make one of the moves of a register."""
-    others, first, second = moves
-    sources[action, register] = first[move]
-    sources[action, others[move]] = second[move]
+            other = moved(own, register, move)[0]
+            mine, theirs = own[register], own[other]
+            make(own, register, move)
+            scores[move] -= copy_cost * count_losses(sources)
+            own[other], own[register] = theirs, mine
+        known_scores[number, len(code)] = scores[move]
 
 
 @compiled_within
