@@ -51,7 +51,7 @@ def score_trials(
     """
     shape = (len(trials), structure.n_registers, alphabet.n_symbols)
     before = np.zeros(shape) if contents is None else contents
-    scores = TrialScores(np.zeros(len(trials)), np.zeros((len(trials), FAILED)), before.copy())
+    scores = TrialScores(np.zeros(len(trials)), np.zeros((len(trials), FAILED)), np.empty(shape))
     by_length: defaultdict[int, list[int]] = defaultdict(list)
     for number, trial in enumerate(trials):
         by_length[len(trial.actions)].append(number)
@@ -60,10 +60,8 @@ def score_trials(
         follow(own, side_by_side([trials[number] for number in numbers]), alphabet)
         scores.log_evidence[numbers] = own.log_evidence
         scores.events[numbers] = own.expected_events()
-        for owner, number in enumerate(numbers):
-            learned = own.learned_contents(owner)
-            if learned is not None:
-                scores.contents[number] = learned
+        learned, is_possible = own.learned()
+        scores.contents[numbers] = np.where(is_possible[:, None, None], learned, before[numbers])
     return scores
 
 

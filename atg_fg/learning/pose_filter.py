@@ -21,22 +21,19 @@ from numpy.typing import NDArray
 from atg_fg.core.actions import AnyAction, UncertainAction
 from atg_fg.core.log_math import log_sum_exp
 from atg_fg.core.patterns import FloatArray, IntArray, PatternAlphabet
-from atg_fg.learning.rates import FAILED, REPEAT, REVEAL, WRONG, Rates
+from atg_fg.learning.rates import REPEAT, REVEAL, WRONG, Rates
 from atg_fg.learning.register_contents import (
     SAME,
     TINY,
     distinctness,
     pattern_products,
     reweigh,
-    symbol_probabilities,
     unrevealed,
 )
-from atg_fg.learning.shared_structure import Poses
+from atg_fg.learning.shared_structure import Poses, poses_in_view
 
 #: Rows less probable than this are left out of what is predicted for planning.
 UNIMPORTANT: Final = 1e-6
-#: A row that is by no more than this above one half is not preferred to the others.
-EVEN: Final = 1e-3
 
 
 class Rows(NamedTuple):
@@ -88,27 +85,16 @@ class PoseFilter:
         alphabet: PatternAlphabet,
         log_weights: FloatArray | None = None,
     ) -> None:
-        self._poses, self._rates, self._alphabet = poses, rates, alphabet
-        self.log_weights = log_weights
-        n_owners, n_poses = len(contents), len(poses.registers)
-        # A new object's registers have no names yet, so any pose of a class is as good as another.
-        is_known: NDArray[np.bool_] = np.any(contents, axis=(1, 2))
-        n_first = np.where(is_known, n_poses, len(poses.first))
-        owner = np.repeat(np.arange(n_owners), n_first)
-        position = np.arange(len(owner)) - np.repeat(np.cumsum(n_first) - n_first, n_first)
-        start = np.where(is_known[owner], 0, position)
-        pose = np.where(is_known[owner], position, poses.first[start])
-        weight = np.where(is_known[owner], 1.0 / n_poses, poses.first_weights[start])
-        events = np.zeros((len(owner), FAILED + poses.successors.shape[1]))
-        self.rows = Rows(owner, start, pose, weight, owner, events)
+        self._rates, self._alphabet, self.log_weights = rates, alphabet, log_weights
+        self._poses = structure = poses_in_view(poses, len(alphabet.slots))
+        from atg_fg.learning import row_kernels  # they load Numba
+
+        n_poses, n_actions = structure.successors.shape
+        classes = structure.first, structure.first_weights
+        rows, self._shown = row_kernels.first_rows(contents, n_poses, *classes, n_actions, rates.repeat)
+        self.rows = Rows(*rows)
         self._contents = contents
-        self._shown = symbol_probabilities(contents, rates.repeat)
-        n_slots = len(alphabet.slots)
-        # Loops are compiled anew for arrays that are read-only: these are copies.
-        self._successors = np.array(poses.successors)
-        self._registers_in_view = np.array(poses.registers[:, :n_slots], order="C")
-        self._possible = poses.possible(n_slots)
-        self.log_evidence = np.zeros(n_owners)
+        self.log_evidence = np.zeros(len(contents))
 
     def copy(self) -> PoseFilter:
         """Return a filter that goes on alone from here."""
@@ -137,7 +123,7 @@ class PoseFilter:
 
     def act_apart(self, actions: IntArray) -> None:
         """Take in an action of each owner, shape [H]."""
-        self.rows = Rows(*self._kernels.act(tuple(self.rows), self._successors, actions, self._rates.slips))
+        self.rows = Rows(*self._kernels.act(tuple(self.rows), self._poses.successors, actions, self._rates.slips))
 
     def observe_pattern(self, symbols: IntArray) -> None:
         """Take in looks that showed every slot, shape [J], or [H, J] for a look of each owner."""
@@ -151,7 +137,7 @@ class PoseFilter:
         rows, (self._contents, self._shown) = self._kernels.follow(
             tuple(self.rows),
             (self._contents, self._shown),
-            (self._successors, self._registers_in_view, self._possible, len(self._poses.first)),
+            (*self._poses[:3], len(self._poses.first)),
             actions,
             symbols,
             (*rates.slips, rates.wrong, rates.wrong / len(self._alphabet), rates.repeat),
@@ -164,10 +150,10 @@ class PoseFilter:
         """Take in any evidence as a likelihood of each pattern, shape [|𝒵|], or [H, |𝒵|] for a look of each owner."""
         rows, symbols = self.rows, self._alphabet.symbols
         likelihood = np.broadcast_to(likelihood, (len(self.log_evidence), len(symbols)))
-        registers = self._registers_in_view[rows.pose]
+        registers = self._poses.registers[rows.pose]
         shown = self._shown_in_view(rows.pose, rows.table)
         joint = pattern_products(shown, symbols) / distinctness(shown, symbols)[:, None]
-        joint *= self._possible[rows.pose, None] * likelihood[rows.owner]
+        joint *= self._poses.possible[rows.pose, None] * likelihood[rows.owner]
         probability = joint.sum(axis=1)
         kept, truth = self._condition(probability, likelihood.sum(axis=1))
         right = np.flatnonzero(truth > SAME)
@@ -185,17 +171,17 @@ class PoseFilter:
 
     def predicted_patterns(self) -> tuple[IntArray, FloatArray]:
         """Return the owners that matter, shape [I], and p(next pattern | action, owner) of each, shape [A, I, |𝒵|]."""
-        owners, patterns = self._patterns_after(self._successors, self._rates.slips)
+        owners, patterns = self._patterns_after(self._poses.successors, self._rates.slips)
         return owners, (1.0 - self._rates.wrong) * patterns + self._rates.wrong / len(self._alphabet)
 
     def shown_patterns(self) -> tuple[IntArray, FloatArray]:
         """Return the owners that matter, shape [I], and p(pattern shown now | owner) of each, shape [I, |𝒵|]."""
-        owners, (patterns,) = self._patterns_after(np.arange(len(self._successors))[:, None], (0.0, 0.0))
+        owners, (patterns,) = self._patterns_after(np.arange(len(self._poses.successors))[:, None], (0.0, 0.0))
         return owners, patterns
 
     def _patterns_after(self, successors: IntArray, slips: tuple[float, float]) -> tuple[IntArray, FloatArray]:
         """Return the owners that matter, and p(pattern shown after each move of [P', A] | owner), shape [A, I, |𝒵|]."""
-        structure = (successors, self._registers_in_view, self._possible)
+        structure = (successors, self._poses.registers, self._poses.possible)
         importance, symbols = self._importance() / UNIMPORTANT, self._alphabet.symbols
         from atg_fg.learning import prediction_kernels  # they load Numba
 
@@ -212,25 +198,26 @@ class PoseFilter:
         return dict(zip(there.tolist(), (weight[there] / weight.sum()).tolist(), strict=True))
 
     def learned_contents(self, owner: int) -> FloatArray | None:
-        """Return the table of an owner's most probable row if it is more so than all others, else their mean, [P, S].
+        """Return what was learned of an owner, shape [P, S]; ``None`` if it has been ruled out."""
+        contents, is_possible = self.learned()
+        learned: FloatArray = contents[owner]
+        return learned if is_possible[owner] else None
 
-        ``None`` if the owner has been ruled out.
+    def learned(self) -> tuple[FloatArray, NDArray[np.bool_]]:
+        """Return what was learned of each owner, shape [H, P, S], and whether it has not been ruled out, shape [H].
+
+        It is the table of the most probable row if it is more so than all others, else their mean.
         """
-        own = np.flatnonzero(self.rows.owner == owner)
-        if not len(own):
-            return None
-        weight, table = self.rows.weight[own], self.rows.table[own]
-        best = int(weight.argmax())
-        if weight[best] > (0.5 + EVEN) * weight.sum():
-            mean: FloatArray = self._contents[table[best]].copy()
-        else:
-            mean = np.einsum("r,rps->ps", weight / weight.sum(), self._contents[table])
-        return mean
+        from atg_fg.learning import row_kernels  # they load Numba
+
+        contents, is_possible = row_kernels.learned_contents(self.rows[:], self._contents, len(self.log_evidence))
+        return contents, is_possible
 
     def expected_events(self) -> FloatArray:
         """Return the expected numbers of each owner, columns as ``atg_fg.learning.rates`` has them, [H, FAILED]."""
-        events = np.zeros((len(self.log_evidence), FAILED))
-        np.add.at(events, self.rows.owner, self.rows.weight[:, None] * self.rows.events[:, :FAILED])
+        from atg_fg.learning import row_kernels  # they load Numba
+
+        events: FloatArray = row_kernels.expected_events(self.rows[:], len(self.log_evidence))
         return events
 
     @property
@@ -241,7 +228,7 @@ class PoseFilter:
 
     def _shown_in_view(self, poses: IntArray, tables: IntArray) -> list[FloatArray]:
         """Return the probability of each symbol in each slot of rows with these poses [..., R], J × [rows, S]."""
-        in_view = np.moveaxis(self._registers_in_view[poses], -1, 0)
+        in_view = np.moveaxis(self._poses.registers[poses], -1, 0)
         return [self._shown[tables, registers].reshape(-1, self._shown.shape[2]) for registers in in_view]
 
     def _condition(self, probability: FloatArray, scale: FloatArray) -> tuple[IntArray, FloatArray]:
@@ -297,7 +284,7 @@ class PoseFilter:
             tables: New ones, shape [I, P, S].
             changed: Index of the row that each belongs to, shape [I].
         """
-        sizes = (len(self._poses.first), len(self._poses.registers))
+        sizes = (len(self._poses.first), len(self._poses.successors))
         rows, (self._contents, self._shown) = self._kernels.merged(
             tuple(self.rows), (self._contents, self._shown), tables, changed, sizes, self._rates.repeat
         )

@@ -11,11 +11,11 @@ them, and with the mode that it leads to. A pose is a mode and an arrangement of
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from operator import itemgetter
-from typing import TYPE_CHECKING, Final, NamedTuple
+from typing import TYPE_CHECKING, Any, Final, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -35,7 +35,8 @@ FURTHER_MODE: Final = 0.2
 TIED: Final = 0.5
 
 
-class Poses(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class Poses:
     """What the actions generate, G poses; in pose 0, of the first mode, each place holds its own register.
 
     Of one mode it is a monoid, and a group if each action is a permutation. Poses that an invertible pose, as a
@@ -63,6 +64,35 @@ class Poses(NamedTuple):
         in_view = np.sort(self.registers[:, :n_slots], axis=1)
         is_possible: NDArray[np.bool_] = np.all(np.diff(in_view, axis=1) > 0, axis=1)
         return is_possible.astype(np.float64)
+
+    def __iter__(self) -> Iterator[NDArray[Any]]:
+        return iter((self.registers, self.successors, self.first, self.first_weights))
+
+
+class PosesInView(NamedTuple):
+    """Poses as compiled loops take them: all arrays lie in order, and none is read-only, which they are compiled for.
+
+    Attributes:
+        successors: The pose that each action leads to, shape [G, A].
+        registers: The register in each slot in each pose, shape [G, J].
+        possible: 1 where these are different, else 0, shape [G].
+        first: As ``Poses`` has it, shape [F].
+        first_weights: As ``Poses`` has it, shape [F].
+    """
+
+    successors: IntArray
+    registers: IntArray
+    possible: FloatArray
+    first: IntArray
+    first_weights: FloatArray
+
+
+@lru_cache(maxsize=256)
+def poses_in_view(poses: Poses, n_slots: int) -> PosesInView:
+    """Return what is in view in some poses, made once for each that are kept."""
+    registers, successors, first, first_weights = (np.array(table, order="C") for table in poses)
+    in_view = np.array(registers[:, :n_slots], order="C")
+    return PosesInView(successors, in_view, poses.possible(n_slots), first, first_weights)
 
 
 @dataclass(frozen=True)
