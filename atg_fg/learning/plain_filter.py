@@ -13,7 +13,7 @@ from atg_fg.core.patterns import Evidence, FloatArray, IntArray
 from atg_fg.inference.expected_entropy import next_pattern_joint, pattern_table
 from atg_fg.inference.history import History
 from atg_fg.inference.recognition_model import COLLECTION, RecognitionModel, widened
-from atg_fg.learning.pose_filter import UNIMPORTANT
+from atg_fg.learning.register_contents import UNIMPORTANT
 
 
 class PlainFilter:

@@ -6,6 +6,7 @@ look would reveal of an object's contents is taken into account; nothing is coun
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple
@@ -16,14 +17,14 @@ from atg_fg.core.log_math import x_log_x
 from atg_fg.core.patterns import Evidence, FloatArray, IntArray
 from atg_fg.inference.expected_entropy import (
     counting_readings,
-    expected_entropies_of_table,
     next_pattern_joint,
     pattern_table,
 )
 from atg_fg.inference.recognition_model import RecognitionModel
 from atg_fg.learning.path_filter import PathFilter
 from atg_fg.learning.plain_filter import PlainFilter
-from atg_fg.learning.pose_filter import UNIMPORTANT, PoseFilter
+from atg_fg.learning.pose_filter import PoseFilter
+from atg_fg.learning.register_contents import UNIMPORTANT
 
 if TYPE_CHECKING:
     from atg_fg.inference.kernels.compiled_filter import CompiledFilter
@@ -87,17 +88,19 @@ class StructureBelief:
             table = self._plain_joint(matters)
         else:
             table = np.zeros((model.n_actions, len(matters), model.n_patterns))
-        place = np.full(model.n_hypotheses, -1)
-        place[matters] = np.arange(len(matters))
+        from atg_fg.learning import prediction_kernels  # they load Numba
+
         for each in self.following:
-            owners, patterns = each.filter.predicted_patterns()
-            own = place[owners] >= 0
-            table[:, place[owners[own]]] += each.belief[owners[own], None] * patterns[:, own]
+            prediction_kernels.add_joint(table, matters, each.belief, *each.filter.predicted_patterns())
         return table
 
     def expected_entropies(self) -> FloatArray:
         """Return the expected entropy of identity after one more action (eq. 3) in nats, shape [A]."""
-        entropies = expected_entropies_of_table(self.joint, float(self.identity[-1]), self.model.n_unseen)
+        from atg_fg.inference.kernels import decision_kernels  # they load Numba
+
+        entropies: FloatArray = decision_kernels.expected_entropies_of_table(
+            self.joint, float(self.identity[-1]), math.log(self.model.n_unseen)
+        )
         if not self.model.objects.senses:
             return entropies
         return counting_readings(self.model, entropies, self.joint, np.ones(self.joint.shape[2]), self._matters)

@@ -13,13 +13,12 @@ from __future__ import annotations
 import copy
 from functools import cached_property
 from types import ModuleType
-from typing import Final, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from atg_fg.core.actions import AnyAction, UncertainAction
-from atg_fg.core.log_math import log_sum_exp
 from atg_fg.core.patterns import FloatArray, IntArray, PatternAlphabet
 from atg_fg.learning.rates import REPEAT, REVEAL, WRONG, Rates
 from atg_fg.learning.register_contents import (
@@ -31,9 +30,6 @@ from atg_fg.learning.register_contents import (
     unrevealed,
 )
 from atg_fg.learning.shared_structure import Poses, poses_in_view
-
-#: Rows less probable than this are left out of what is predicted for planning.
-UNIMPORTANT: Final = 1e-6
 
 
 class Rows(NamedTuple):
@@ -85,7 +81,8 @@ class PoseFilter:
         alphabet: PatternAlphabet,
         log_weights: FloatArray | None = None,
     ) -> None:
-        self._rates, self._alphabet, self.log_weights = rates, alphabet, log_weights
+        self._rates, self._alphabet = rates, alphabet
+        self.log_weights = np.zeros(0) if log_weights is None else log_weights
         self._poses = structure = poses_in_view(poses, len(alphabet.slots))
         from atg_fg.learning import row_kernels  # they load Numba
 
@@ -133,7 +130,7 @@ class PoseFilter:
 
     def follow(self, actions: IntArray, symbols: IntArray) -> None:
         """Take in looks that showed every slot, shape [T, H, J], and the actions between them, shape [T − 1, H]."""
-        rates, log_weights = self._rates, np.zeros(0) if self.log_weights is None else self.log_weights
+        rates = self._rates
         rows, (self._contents, self._shown) = self._kernels.follow(
             tuple(self.rows),
             (self._contents, self._shown),
@@ -142,7 +139,7 @@ class PoseFilter:
             symbols,
             (*rates.slips, rates.wrong, rates.wrong / len(self._alphabet), rates.repeat),
             self.log_evidence,
-            log_weights,
+            self.log_weights,
         )
         self.rows = Rows(*rows)
 
@@ -171,22 +168,23 @@ class PoseFilter:
 
     def predicted_patterns(self) -> tuple[IntArray, FloatArray]:
         """Return the owners that matter, shape [I], and p(next pattern | action, owner) of each, shape [A, I, |𝒵|]."""
-        owners, patterns = self._patterns_after(self._poses.successors, self._rates.slips)
-        return owners, (1.0 - self._rates.wrong) * patterns + self._rates.wrong / len(self._alphabet)
+        return self._patterns_after(self._poses.successors, self._rates.slips, self._rates.wrong)
 
     def shown_patterns(self) -> tuple[IntArray, FloatArray]:
         """Return the owners that matter, shape [I], and p(pattern shown now | owner) of each, shape [I, |𝒵|]."""
-        owners, (patterns,) = self._patterns_after(np.arange(len(self._poses.successors))[:, None], (0.0, 0.0))
+        owners, (patterns,) = self._patterns_after(np.arange(len(self._poses.successors))[:, None], (0.0, 0.0), 0.0)
         return owners, patterns
 
-    def _patterns_after(self, successors: IntArray, slips: tuple[float, float]) -> tuple[IntArray, FloatArray]:
+    def _patterns_after(
+        self, successors: IntArray, slips: tuple[float, float], wrong: float
+    ) -> tuple[IntArray, FloatArray]:
         """Return the owners that matter, and p(pattern shown after each move of [P', A] | owner), shape [A, I, |𝒵|]."""
-        structure = (successors, self._poses.registers, self._poses.possible)
-        importance, symbols = self._importance() / UNIMPORTANT, self._alphabet.symbols
         from atg_fg.learning import prediction_kernels  # they load Numba
 
+        structure = successors, self._poses.registers, self._poses.possible
+        evidence = self.log_evidence, self.log_weights
         owners, patterns = prediction_kernels.patterns_after(
-            self.rows[:], self._shown, structure, symbols, importance, slips
+            self.rows[:], self._shown, structure, self._alphabet.symbols, *evidence, slips, wrong
         )
         return owners, patterns
 
@@ -243,21 +241,12 @@ class PoseFilter:
         """
         wrong = self._rates.wrong / len(self._alphabet) * np.broadcast_to(scale, len(self.log_evidence))
         likelihoods = (1.0 - self._rates.wrong) * probability, wrong
-        log_weights = np.zeros(0) if self.log_weights is None else self.log_weights
         kept, truth, weight = self._kernels.weigh(
-            self.rows.owner, self.rows.weight, likelihoods, self.log_evidence, log_weights
+            self.rows.owner, self.rows.weight, likelihoods, self.log_evidence, self.log_weights
         )
         self.rows = self.rows.take(kept)._replace(weight=weight)
         self.rows.events[:, WRONG] += 1.0 - truth
         return kept, truth
-
-    def _importance(self) -> FloatArray:
-        """Return the weight of each owner relative to the greatest, shape [H]; one for each that has no rivals."""
-        if self.log_weights is None:
-            return np.ones(len(self.log_evidence))
-        logarithms = self.log_weights + self.log_evidence
-        total = log_sum_exp(logarithms)
-        return np.exp(logarithms - total) if np.isfinite(total) else np.zeros_like(logarithms)
 
     def _count_reveals(self, rows: IntArray, before: FloatArray, shown: FloatArray, revealed: FloatArray) -> None:
         """Count how probably a slot's register was revealed by a look, and its symbol drawn from all symbols.
@@ -270,7 +259,7 @@ class PoseFilter:
             shown: The probability of each of its symbols, shape [I, S].
             revealed: The probability that it was revealed and has a symbol, shape [I, S].
         """
-        if self.log_weights is not None:
+        if len(self.log_weights):
             return
         from_all = self._rates.repeat / self._alphabet.n_symbols * unrevealed(before[:, None, :])
         share = np.minimum(from_all / np.maximum(shown - before, TINY), 1.0)

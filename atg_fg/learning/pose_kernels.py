@@ -101,16 +101,9 @@ def weigh(
     total = np.zeros(n_owners)
     for row in range(n_rows):
         total[owner[row]] += weight[row] * (right[row] + wrong[owner[row]])
-    importance, peak, whole = np.ones(n_owners), -np.inf, 0.0
     for each in range(n_owners):
         log_evidence[each] += np.log(total[each])
-    for each in range(len(log_weights)):
-        peak = max(peak, log_weights[each] + log_evidence[each])
-    for each in range(len(log_weights)):
-        importance[each] = np.exp(log_weights[each] + log_evidence[each] - peak) if peak > -np.inf else 0.0
-        whole += importance[each]
-    for each in range(len(log_weights)):
-        importance[each] /= max(whole, _LEAST)
+    importance = importance_of(log_evidence, log_weights)
     kept, truth, weights, n_kept = np.empty(n_rows, np.int64), np.empty(n_rows), np.empty(n_rows), 0
     for row in range(n_rows):
         both = right[row] + wrong[owner[row]]
@@ -119,6 +112,20 @@ def weigh(
             kept[n_kept], truth[n_kept], weights[n_kept] = row, right[row] / both, own
             n_kept += 1
     return kept[:n_kept], truth[:n_kept], weights[:n_kept]
+
+
+@compiled_within
+def importance_of(log_evidence: FloatArray, log_weights: FloatArray) -> FloatArray:
+    """Return p(owner | what was seen), shape [H], or 1 where ``log_weights`` is empty: each is a trial of its own."""
+    importance, peak, whole = np.ones(len(log_evidence)), -np.inf, 0.0
+    for each in range(len(log_weights)):
+        peak = max(peak, log_weights[each] + log_evidence[each])
+    for each in range(len(log_weights)):
+        importance[each] = np.exp(log_weights[each] + log_evidence[each] - peak) if peak > -np.inf else 0.0
+        whole += importance[each]
+    for each in range(len(log_weights)):
+        importance[each] /= max(whole, _LEAST)
+    return importance
 
 
 @written_out

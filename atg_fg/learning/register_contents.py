@@ -18,6 +18,8 @@ from atg_fg.core.patterns import FloatArray, IntArray
 TINY: Final = 1e-12
 #: A table that a look would change by less than this stays as it is.
 SAME: Final = 1e-6
+#: Objects, and what they may have in their registers, are left out of what is predicted if less probable than this.
+UNIMPORTANT: Final = 1e-6
 
 
 def unrevealed(contents: FloatArray) -> FloatArray:

@@ -5,7 +5,7 @@ import pytest
 
 from atg_fg.core.actions import UncertainAction
 from atg_fg.learning.pose_chain import pose_patterns
-from atg_fg.learning.pose_filter import PoseFilter
+from atg_fg.learning.pose_filter import PoseFilter, Rows
 from atg_fg.learning.rates import FAILED, Rates
 from atg_fg.learning.raw_trials import side_by_side
 from atg_fg.learning.register_contents import symbol_probabilities
@@ -64,3 +64,31 @@ def test_predicted_patterns_are_sums_over_poses_and_slips(structure, last):
                 stayed = shown[rows.table[row], rows.pose[row]]
                 right += rows.weight[row] / total * ((1 - slip) * after + slip * stayed)
             np.testing.assert_allclose(predicted[action, place], 0.98 * right + 0.02 / len(ALPHABET), rtol=0, atol=1e-9)
+
+
+def test_before_the_first_look_a_new_object_is_in_one_pose_of_each_class_and_a_known_one_in_any():
+    poses = BOX.poses()
+    contents = np.stack((np.zeros((BOX.n_registers, 5)), np.eye(5)[: BOX.n_registers] * 0.6))
+    rows = (own := PoseFilter(poses, contents, OFTEN, ALPHABET)).rows
+    new, known = rows.take(np.flatnonzero(rows.owner == 0)), rows.take(np.flatnonzero(rows.owner == 1))
+    assert (new.pose.tolist(), new.weight.tolist()) == (poses.first.tolist(), poses.first_weights.tolist())
+    assert new.start.tolist() == list(range(len(poses.first)))
+    assert (known.pose.tolist(), set(known.start.tolist())) == (list(range(len(poses.registers))), {0})
+    assert known.weight == pytest.approx(1 / len(poses.registers))
+    assert rows.table.tolist() == rows.owner.tolist()
+    assert not rows.events.any()
+    np.testing.assert_allclose(own._shown, symbol_probabilities(contents, OFTEN.repeat), rtol=1e-12)
+
+
+def test_learned_is_the_table_of_a_row_that_is_likelier_than_all_others_else_their_mean():
+    own = PoseFilter(RING.poses(), np.zeros((3, RING.n_registers, 5)), OFTEN, ALPHABET)
+    tables, events = np.arange(4.0)[:, None, None] * np.ones((RING.n_registers, 5)), np.zeros((4, FAILED + 2))
+    events[:, 0] = 1.0, 2.0, 3.0, 4.0
+    owner, weight, nothing = np.array([0, 0, 2, 2]), np.array([0.7, 0.3, 0.5, 0.5]), np.zeros(4, np.int64)
+    own.rows, own._contents = Rows(owner, nothing, nothing, weight, np.array([3, 1, 2, 0]), events), tables
+    learned, is_possible = own.learned()
+    assert is_possible.tolist() == [True, False, True]
+    assert (learned[0] == 3).all()
+    assert learned[2] == pytest.approx(1.0)
+    assert own.learned_contents(1) is None
+    assert own.expected_events()[:, 0] == pytest.approx([0.7 * 1 + 0.3 * 2, 0, 3.5])

@@ -211,6 +211,28 @@ def expected_entropies(
 
 
 @compiled
+def expected_entropies_of_table(table: FloatArray, unseen: float, log_n_unseen: float) -> FloatArray:
+    """Return eq. 3 for each action in nats, shape [A], from J = p(O = i, z | a) of every pattern, shape [A, I, |𝒵|].
+
+    Args:
+        table: J; its last hypothesis is *unseen*.
+        unseen: p(unseen | z_0:t).
+        log_n_unseen: Ln U.
+    """
+    n_actions, n_hypotheses, n_patterns = table.shape
+    expected, predictive = np.empty(n_actions), np.empty(n_patterns)
+    for action in range(n_actions):
+        predictive[:] = 0.0
+        terms = 0.0
+        for hypothesis in range(n_hypotheses):
+            terms += _sum_x_log_x(table[action, hypothesis])
+            for pattern in range(n_patterns):
+                predictive[pattern] += table[action, hypothesis, pattern]
+        expected[action] = max(_sum_x_log_x(predictive) - terms + unseen * log_n_unseen, 0.0)
+    return expected
+
+
+@compiled
 def next_patterns(
     tables: tuple[Any, ...],
     constants: tuple[Any, ...],
