@@ -253,7 +253,7 @@ FAULTS = [
     Fault(
         "rates: whether slips come together is told by the kinds in force",
         "learning/kinds.py",
-        "return Tally(*map(sum, zip(*tallies, strict=True))), commonest.tally(trials, alone)",
+        "return Tally(*map(sum, zip(*tallies, strict=True))), commonest.tally(alone)",
         "return (Tally(*map(sum, zip(*tallies, strict=True))),) * 2",
     ),
     Fault(

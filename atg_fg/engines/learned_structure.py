@@ -121,9 +121,7 @@ class LearnedStructure(BayesFilter):
                 each.weigh(felt)
         self._known = None
         if self._followed:
-            (_, *joints), total, _ = self._beliefs()
-            least = total + np.log(RULED_OUT)
-            kept = [log_sum_exp(joint) > least for joint in joints]
+            kept = [belief.sum() > RULED_OUT for belief in self._type_beliefs()[1:]]
             if not all(kept):
                 self._followed, self._known = list(itertools.compress(self._followed, kept)), None
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from atg_fg.core.assumptions import Assumptions
-from atg_fg.core.patterns import FloatArray
+from atg_fg.core.patterns import FloatArray, IntArray
 from atg_fg.learning.likelihood import TrialScores, score_trials
 from atg_fg.learning.rates import FAILED, Rates, Tally
 from atg_fg.learning.raw_trials import RawTrial
@@ -24,6 +24,7 @@ class Candidate:
     Attributes:
         log_evidence: ln p(trial | structure) given ``NEW``, ``FILED`` and ``BEFORE``, shape [3, n]. The last sums over
             the object that a trial is filed under and a new one alone.
+        n_looks: Of each trial, shape [n].
         events: Expected numbers in each trial, columns as ``atg_fg.learning.rates`` has them, shape [n, FAILED].
         contents: What is known of each object, each of shape [P, S].
     """
@@ -36,6 +37,7 @@ class Candidate:
     def forget(self) -> None:
         """Have all trials scored anew, and the contents of all objects learned anew."""
         self.log_evidence: FloatArray = np.zeros((3, 0))
+        self.n_looks: IntArray = np.zeros(0, dtype=np.int64)
         self.events: FloatArray = np.zeros((0, FAILED))
         self.contents: list[FloatArray] = []
 
@@ -68,19 +70,20 @@ class Candidate:
             again = [owner for owner, numbers in by_owner.items() if len(numbers) > rank]
             numbers = [by_owner[owner][rank] for owner in again]
             filed[numbers] = self._learn(again, [new[number] for number in numbers], nothing[:0], rates).log_evidence
-        self.log_evidence = np.concatenate((self.log_evidence, self._given(fresh, filed, owners)), axis=1)
+        given = self._given(fresh, filed, n_known, owners[n_before:])
+        self.log_evidence = np.concatenate((self.log_evidence, given), axis=1)
+        self.n_looks = np.concatenate((self.n_looks, [len(trial.detections) for trial in new]))
         self.events = np.concatenate((self.events, scores.events[: len(new)]))
 
-    def _given(self, fresh: FloatArray, filed: FloatArray, owners: Sequence[int]) -> FloatArray:
+    def _given(self, fresh: FloatArray, filed: FloatArray, n_known: int, owners: Sequence[int]) -> FloatArray:
         """Return the evidence of the newest trials by what is given, shape [3, len(fresh)].
 
         An object is the one that the trial is filed under, or any that was not met yet, each as probable.
         """
-        n_met = np.maximum.accumulate([-1, *owners[:-1]])[-len(fresh) :] + 1
+        n_met = np.maximum.accumulate([n_known - 1, *owners[:-1]]) + 1
         n_objects = np.maximum(self._n_objects, n_met + 1)
         of_new = np.log(n_objects - n_met) + fresh
-        is_new = np.array(owners[-len(fresh) :]) == n_met
-        before = np.where(is_new, of_new, np.logaddexp(of_new, filed)) - np.log(n_objects)
+        before = np.where(np.array(owners) == n_met, of_new, np.logaddexp(of_new, filed)) - np.log(n_objects)
         return np.array([fresh, filed, before])
 
     def _learn(self, owners: Sequence[int], trials: Sequence[RawTrial], fresh: FloatArray, rates: Rates) -> TrialScores:
@@ -91,14 +94,12 @@ class Candidate:
             self.contents[owner] = contents
         return scores
 
-    def tally(self, trials: Sequence[RawTrial], following: FloatArray) -> Tally:
+    def tally(self, following: FloatArray) -> Tally:
         """Return the expected numbers of events over all trials, each counted as far as it follows the structure.
 
         Args:
-            trials: All raw trials.
             following: The probability that each follows it, shape [n].
         """
         slips, wrong, repeats, reveals, again, n_failed_before = following @ self.events
-        n_actions = following @ np.array([len(trial.actions) for trial in trials])
-        n_looks = following @ np.array([len(trial.detections) for trial in trials])
+        n_actions, n_looks = following @ (self.n_looks - 1), following @ self.n_looks
         return Tally(*map(float, (slips, n_actions, again, n_failed_before, wrong, n_looks, repeats, reveals)))

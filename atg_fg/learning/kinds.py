@@ -16,7 +16,6 @@ from atg_fg.core.patterns import FloatArray
 from atg_fg.learning.candidate import Candidate
 from atg_fg.learning.likelihood import BEFORE
 from atg_fg.learning.rates import AGAIN, SLIP, WRONG, Rates, Tally
-from atg_fg.learning.raw_trials import RawTrial
 
 #: Columns of what is no structure: plain, and plain with uncertain actions.
 SURE_KIND, UNCERTAIN_KIND, N_PLAIN = range(3)
@@ -74,19 +73,18 @@ class KindSet(NamedTuple):
     trials: KindShares
 
 
-def kind_table(
-    kinds: Sequence[Candidate], plain: FloatArray, trials: Sequence[RawTrial], rates: Rates, given: int = BEFORE
-) -> FloatArray:
+def kind_table(kinds: Sequence[Candidate], plain: FloatArray, rates: Rates, given: int = BEFORE) -> FloatArray:
     """Return ln p(trial | kind), the two plain kinds first, shape [n, 2 + K].
 
     Args:
-        kinds: K structures, scored on all trials.
+        kinds: K structures, scored on all trials; one of too many errors is none of a kind's.
         plain: ln p(trial | plain) of the two plain kinds, shape [n, 2].
-        trials: All raw trials, of which too many errors are none of a kind's.
         rates: Those in force.
         given: What the evidence is given: ``NEW``, ``FILED`` or ``BEFORE``.
     """
-    n_looks = np.array([len(trial.detections) for trial in trials])
+    if not kinds:
+        return plain
+    n_looks = kinds[0].n_looks
     excess_wrong = max(rates.wrong - PRIOR_RATES.wrong, 0.0) * n_looks
     excess_events = excess_wrong + max(rates.slip - PRIOR_RATES.slip, 0.0) * (n_looks - 1)
     most_wrong = WRONG_LIMIT[0] + WRONG_LIMIT[1] * n_looks + EXCESS_FACTOR * excess_wrong
@@ -133,9 +131,7 @@ def evidence_alone(pool: Sequence[Candidate], table: FloatArray, numbers: Sequen
     return {number: of + pool[number].structure.log_prior for number, of in zip(numbers, evidence, strict=True)}
 
 
-def choose_kinds(
-    pool: Sequence[Candidate], plain: FloatArray, trials: Sequence[RawTrial], rates: Rates
-) -> list[KindSet]:
+def choose_kinds(pool: Sequence[Candidate], plain: FloatArray, rates: Rates) -> list[KindSet]:
     """Return the sets of kinds that are believed in, best first: the best, and its best neighbours if not far behind.
 
     From none, the change that gains most is made for as long as there is one: one structure more, one less, one for
@@ -144,11 +140,9 @@ def choose_kinds(
     Args:
         pool: Structures, scored on all trials.
         plain: ln p(trial | plain) of the two plain kinds, shape [n, 2].
-        trials: All raw trials.
         rates: Those in force.
     """
-    table = kind_table(pool, plain, trials, rates)
-    n_looks = np.array([len(trial.detections) for trial in trials])
+    table = kind_table(pool, plain, rates)
     known: dict[frozenset[int], float] = {}
     made: dict[frozenset[int], KindSet | None] = {}
 
@@ -157,7 +151,7 @@ def choose_kinds(
             chosen = tuple(sorted(kinds))
             shares = share_kinds(table[:, [SURE_KIND, UNCERTAIN_KIND, *(N_PLAIN + number for number in chosen)]])
             following = zip(chosen, shares.responsibilities[:, N_PLAIN:].T, strict=True)
-            are_kinds = all(_is_kind(pool[number], own, n_looks) for number, own in following)
+            are_kinds = all(_is_kind(pool[number], own) for number, own in following)
             made[kinds] = KindSet(chosen, known[kinds], shares) if are_kinds else None
         return made[kinds]
 
@@ -177,29 +171,26 @@ def choose_kinds(
     return [best, *itertools.islice(filter(None, map(of, near)), MAX_BELIEVED - 1)]
 
 
-def tally_events(
-    kinds: KindSet, pool: Sequence[Candidate], plain: FloatArray, trials: Sequence[RawTrial], rates: Rates
-) -> tuple[Tally, Tally]:
+def tally_events(kinds: KindSet, pool: Sequence[Candidate], plain: FloatArray, rates: Rates) -> tuple[Tally, Tally]:
     """Return the events in all trials of a set of structures, and in those of its commonest one if it were alone.
 
     Args:
         kinds: The set, not empty.
         pool: Structures, scored on all trials.
         plain: ln p(trial | plain) of the two plain kinds, shape [n, 2].
-        trials: All raw trials.
         rates: Those in force.
     """
     following = kinds.trials.responsibilities.T[N_PLAIN:]
-    tallies = [pool[number].tally(trials, own) for number, own in zip(kinds.structures, following, strict=True)]
+    tallies = [pool[number].tally(own) for number, own in zip(kinds.structures, following, strict=True)]
     commonest = pool[kinds.structures[following.sum(axis=1).argmax()]]
-    alone = share_kinds(kind_table([commonest], plain, trials, rates)).responsibilities[:, N_PLAIN]
-    return Tally(*map(sum, zip(*tallies, strict=True))), commonest.tally(trials, alone)
+    alone = share_kinds(kind_table([commonest], plain, rates)).responsibilities[:, N_PLAIN]
+    return Tally(*map(sum, zip(*tallies, strict=True))), commonest.tally(alone)
 
 
-def _is_kind(candidate: Candidate, following: FloatArray, n_looks: FloatArray) -> bool:
+def _is_kind(candidate: Candidate, following: FloatArray) -> bool:
     """Return whether something follows a structure, and without many errors."""
     wrong = float(following @ candidate.events[:, WRONG])
-    return bool(following.max() > 0.5 and wrong <= MAX_WRONG[0] + MAX_WRONG[1] * float(following @ n_looks))
+    return bool(following.max() > 0.5 and wrong <= MAX_WRONG[0] + MAX_WRONG[1] * float(following @ candidate.n_looks))
 
 
 def _changes(chosen: frozenset[int], n: int) -> list[frozenset[int]]:

@@ -193,7 +193,7 @@ class StructureLearner:
         if not self._sets:
             return 0.0
         chosen = [self._candidates[number] for number in self._sets[0].structures]
-        fresh = kind_table(chosen, self._plain.of_kinds(self.noise, NEW), self.trials, self.rates, NEW)
+        fresh = kind_table(chosen, self._plain.of_kinds(self.noise, NEW), self.rates, NEW)
         return share_kinds(fresh).log_evidence + sum(each.structure.log_prior for each in chosen)
 
     def believed(self, names: Sequence[str]) -> list[BelievedStructure]:
@@ -244,7 +244,7 @@ class StructureLearner:
         shares = kinds.trials.shares
         if kinds.structures not in self._kinds_of_objects:
             chosen = [self._candidates[number] for number in kinds.structures]
-            by_trial = kind_table(chosen, self._plain.of_kinds(self.noise, FILED), self.trials, self.rates, FILED)
+            by_trial = kind_table(chosen, self._plain.of_kinds(self.noise, FILED), self.rates, FILED)
             by_object = np.zeros((len(self._objects), len(shares)))
             np.add.at(by_object, self._owner_indices, by_trial)
             by_object += np.log(shares)
@@ -345,7 +345,7 @@ class StructureLearner:
         kept = list(dict.fromkeys(number for each in self._sets for number in each.structures))
         plain, others = self._of_plain(), [number for number in range(len(self._candidates)) if number not in kept]
         nothing = share_kinds(plain).log_evidence
-        table = kind_table(self._candidates, plain, self.trials, self.rates)
+        table = kind_table(self._candidates, plain, self.rates)
         alone = evidence_alone(self._candidates, table, others)
         spare = sorted(
             (number for number in alone if alone[number] > nothing - KEPT_WITHIN), key=lambda number: -alone[number]
@@ -363,7 +363,7 @@ class StructureLearner:
         self._plain.catch_up(self.trials, self.owners)
         for each in self._candidates:
             each.catch_up(self.trials, self._owner_indices, self.rates)
-        self._chosen = choose_kinds(self._candidates, self._of_plain(), self.trials, self.rates) if self.trials else []
+        self._chosen = choose_kinds(self._candidates, self._of_plain(), self.rates) if self.trials else []
 
     def _rescore(self) -> None:
         self._plain.forget()
@@ -386,7 +386,7 @@ class StructureLearner:
         best = self._sets[0]
         if not best.structures:
             return
-        tally, alone = tally_events(best, self._candidates, self._of_plain(), self.trials, self.rates)
+        tally, alone = tally_events(best, self._candidates, self._of_plain(), self.rates)
         followers = self._members(best, list(self._objects))[:-1, N_PLAIN:].sum(axis=1)
         estimated = estimate_rates(tally, followers, alone)
         old, new = (np.array([*each.slips, each.wrong, each.repeat]) for each in (self.rates, estimated))

@@ -62,45 +62,45 @@ def scored(structures, objects, seed=0, n_actions=10):
 
 
 def test_two_kinds_are_better_than_either_alone():
-    pool, plain, trials = scored([CUBE, PRISM], [*cubes(6), *prisms(6)])
-    best = choose_kinds(pool, plain, trials, RATES)[0]
+    pool, plain, _ = scored([CUBE, PRISM], [*cubes(6), *prisms(6)])
+    best = choose_kinds(pool, plain, RATES)[0]
     assert best.structures == (0, 1)
     for alone in pool:
-        assert best.log_evidence > choose_kinds([alone], plain, trials, RATES)[0].log_evidence + 50
+        assert best.log_evidence > choose_kinds([alone], plain, RATES)[0].log_evidence + 50
     assert best.trials.responsibilities.argmax(axis=1).tolist() == [N_PLAIN] * 6 + [N_PLAIN + 1] * 6
 
 
 def test_a_kind_that_nothing_follows_is_not_chosen():
-    pool, plain, trials = scored([PRISM, CUBE], cubes(6))
-    assert choose_kinds(pool, plain, trials, RATES)[0].structures == (1,)
-    pool, plain, trials = scored([PRISM, CUBE], random_objects(6, np.random.default_rng(1)))
-    assert choose_kinds(pool, plain, trials, RATES)[0].structures == ()
+    pool, plain, _ = scored([PRISM, CUBE], cubes(6))
+    assert choose_kinds(pool, plain, RATES)[0].structures == (1,)
+    pool, plain, _ = scored([PRISM, CUBE], random_objects(6, np.random.default_rng(1)))
+    assert choose_kinds(pool, plain, RATES)[0].structures == ()
 
 
 def test_a_trial_that_errs_too_much_for_a_kind_is_none_of_it():
     pool, plain, trials = scored([CUBE], cubes(1))
-    assert kind_table(pool, plain, trials, RATES)[0, N_PLAIN] > plain[0].max()
+    assert kind_table(pool, plain, RATES)[0, N_PLAIN] > plain[0].max()
     spoiled = list(trials[0].detections)
     for look in (2, 4, 6, 8):  # the slots of a look exchanged: what a planted fault in the camera would show
         spoiled[look] = spoiled[look][::-1]
     wrong = [RawTrial(tuple(spoiled), trials[0].actions)]
     pool[0].forget()
     pool[0].catch_up(wrong, [0], RATES)
-    assert kind_table(pool, plain, wrong, RATES)[0, N_PLAIN] <= plain[0].max() - 10
+    assert kind_table(pool, plain, RATES)[0, N_PLAIN] <= plain[0].max() - 10
 
 
 def test_a_structure_that_errs_a_little_in_each_trial_is_no_kind():
-    pool, plain, trials = scored([CUBE], cubes(8))
-    assert choose_kinds(pool, plain, trials, RATES)[0].structures == (0,)
+    pool, plain, _ = scored([CUBE], cubes(8))
+    assert choose_kinds(pool, plain, RATES)[0].structures == (0,)
     pool[0].events[:, WRONG] = 1.0  # few enough for each trial, and too many for all
-    assert choose_kinds(pool, plain, trials, RATES)[0].structures == ()
+    assert choose_kinds(pool, plain, RATES)[0].structures == ()
 
 
 def test_sets_that_explain_nearly_as_much_are_believed_in_too():
-    pool, plain, trials = scored([CUBE], cubes(2), n_actions=3)
-    gain = choose_kinds(pool, plain, trials, RATES)[0].log_evidence - share_kinds(plain).log_evidence
+    pool, plain, _ = scored([CUBE], cubes(2), n_actions=3)
+    gain = choose_kinds(pool, plain, RATES)[0].log_evidence - share_kinds(plain).log_evidence
     pool[0].log_evidence[:, 0] -= max(gain - 2.0, 0.0) if gain > 0 else 0.0
-    sets = choose_kinds(pool, plain, trials, RATES)
+    sets = choose_kinds(pool, plain, RATES)
     assert {each.structures for each in sets} == {(0,), ()}
     assert sets[0].log_evidence >= sets[1].log_evidence > sets[0].log_evidence - 7
 
@@ -110,9 +110,10 @@ def pool_of(tables, structures, wrong=None):
     pool = [Candidate(structure, ARCUBES) for structure in structures]
     for number, (each, log_evidence) in enumerate(zip(pool, tables, strict=True)):
         each.log_evidence, each.events = np.tile(log_evidence, (3, 1)), np.zeros((len(log_evidence), FAILED))
+        each.n_looks = np.full(len(log_evidence), 11)
         if wrong is not None:
             each.events[:, WRONG] = wrong[number]
-    return pool, [RawTrial(((0, 1),) * 11, (0,) * 10)] * len(tables[0])
+    return pool
 
 
 def wide(*n_registers):
@@ -126,8 +127,8 @@ def test_the_best_set_of_kinds_is_the_best_of_all_sets(seed):
     structures, n = wide(2, 3, 4, 5, 6, 7), 12
     plain = np.column_stack((rng.normal(-30, 3, n), np.full(n, -40.0)))
     explained, wrong = rng.random((6, n)) < 0.45, np.where(rng.random((6, n)) < 0.15, 1.0, 0.0)
-    pool, trials = pool_of(np.where(explained, rng.normal(-20, 4, (6, n)), -70.0), structures, wrong)
-    table, evidence = kind_table(pool, plain, trials, RATES), {}
+    pool = pool_of(np.where(explained, rng.normal(-20, 4, (6, n)), -70.0), structures, wrong)
+    table, evidence = kind_table(pool, plain, RATES), {}
     for chosen in itertools.chain.from_iterable(
         itertools.combinations(range(6), size) for size in range(MAX_KINDS + 1)
     ):
@@ -138,7 +139,7 @@ def test_the_best_set_of_kinds_is_the_best_of_all_sets(seed):
             for number, each in zip(chosen, of, strict=True)
         ):
             evidence[chosen] = shares.log_evidence + sum(structures[number].log_prior for number in chosen)
-    best = choose_kinds(pool, plain, trials, RATES)[0]
+    best = choose_kinds(pool, plain, RATES)[0]
     assert best.log_evidence == pytest.approx(evidence[best.structures])
     assert best.structures == max(evidence, key=evidence.__getitem__)
 
@@ -146,8 +147,8 @@ def test_the_best_set_of_kinds_is_the_best_of_all_sets(seed):
 def test_of_structures_that_explain_nearly_as_much_the_best_are_believed_in():
     """Each takes the place of the best one; beside it none gains what it costs beforehand."""
     behind = (3.0, 0.0, 2.0, 1.0, 4.0)
-    pool, trials = pool_of([[-20.0 - each, *[-20.0] * 5] for each in behind], wide(6) * 5)
-    sets = choose_kinds(pool, np.full((6, 2), -60.0), trials, RATES)
+    pool = pool_of([[-20.0 - each, *[-20.0] * 5] for each in behind], wide(6) * 5)
+    sets = choose_kinds(pool, np.full((6, 2), -60.0), RATES)
     assert [each.structures for each in sets] == [(1,), (3,), (2,)]
     assert [sets[0].log_evidence - each.log_evidence for each in sets] == pytest.approx([0.0, 1.0, 2.0])
 
@@ -171,19 +172,19 @@ def test_wrong_looks_and_slips_beyond_a_limit_are_none_of_a_kind(rates, wrong, s
 
     Of one wrong look and five slips more in a hundred that is 0.33 and 1.83. Slips after slips do not count.
     """
-    ((kind,), trials), plain = pool_of([[-20.0]], wide(3)), np.array([[-25.0, -30.0]])
+    (kind,), plain = pool_of([[-20.0]], wide(3)), np.array([[-25.0, -30.0]])
     kind.events[0, [WRONG, SLIP, AGAIN]] = wrong, slips + 4, 4
-    assert kind_table([kind], plain, trials, rates)[0, N_PLAIN] == (-20.0 if is_one else -35.0)
+    assert kind_table([kind], plain, rates)[0, N_PLAIN] == (-20.0 if is_one else -35.0)
 
 
 def test_events_are_those_of_the_set_and_of_its_commonest_structure_if_it_were_alone():
     """Three trials follow the first structure, the fourth the second, or the first less probably."""
-    pool, trials = pool_of([[-20.0, -20.0, -20.0, -40.0], [-90.0, -90.0, -90.0, -20.0]], wide(3, 4))
+    pool = pool_of([[-20.0, -20.0, -20.0, -40.0], [-90.0, -90.0, -90.0, -20.0]], wide(3, 4))
     for candidate, slips in zip(pool, (1.0, 2.0), strict=True):
         candidate.events[:, SLIP] = slips
     plain = np.full((4, 2), -60.0)
-    best = next(each for each in choose_kinds(pool, plain, trials, RATES) if each.structures == (0, 1))
-    together, alone = tally_events(best, pool, plain, trials, RATES)
+    best = next(each for each in choose_kinds(pool, plain, RATES) if each.structures == (0, 1))
+    together, alone = tally_events(best, pool, plain, RATES)
     assert (together.slips, together.n_actions) == pytest.approx((3 + 2, 40), abs=1e-6)
     assert (alone.slips, alone.n_actions) == pytest.approx((4, 40), abs=1e-6)
 
@@ -193,5 +194,5 @@ def test_what_few_trials_of_many_take_for_wrong_is_not_excused_by_the_others():
     first = np.repeat([-20.0, -90.0], [56, 4])
     plain = np.full((60, 2), -60.0)
     for wrong, chosen in ((0.7, (0, 1)), (0.75, (0,))):
-        pool, trials = pool_of([first, -110.0 - first], wide(3, 4), [0.0, wrong])
-        assert choose_kinds(pool, plain, trials, RATES)[0].structures == chosen
+        pool = pool_of([first, -110.0 - first], wide(3, 4), [0.0, wrong])
+        assert choose_kinds(pool, plain, RATES)[0].structures == chosen

@@ -103,7 +103,7 @@ def test_each_object_of_two_kinds_is_of_its_own(mixed):
 
 @pytest.mark.slow
 def test_kinds_are_better_than_any_structure_alone(mixed):
-    alone = [choose_kinds([each], mixed._of_plain(), mixed.trials, mixed.rates)[0] for each in mixed._candidates]
+    alone = [choose_kinds([each], mixed._of_plain(), mixed.rates)[0] for each in mixed._candidates]
     assert mixed._sets[0].log_evidence > max(each.log_evidence for each in alone) + 50
 
 
@@ -225,7 +225,7 @@ def test_in_whatever_order_objects_are_asked_for_each_has_its_own_contents():
         assert sorted(own.argmax(axis=1).tolist()) == sorted(contents[int(name)])
     np.testing.assert_array_equal(again.contents[[0, 2]], best.contents[[2, 0]])
     np.testing.assert_array_equal(again.followers[[0, 2]], best.followers[[2, 0]])
-    of_plain = choose_kinds([], learner._of_plain(), trials, learner.rates)[0].log_evidence
+    of_plain = choose_kinds([], learner._of_plain(), learner.rates)[0].log_evidence
     assert learner.gain == pytest.approx(learner._sets[0].log_evidence - of_plain)
     # Against the model in which looks err it is weighed by objects never met, however trials are filed.
     apart = StructureLearner(RING_WORLD)
