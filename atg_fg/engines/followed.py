@@ -220,8 +220,7 @@ class FollowedPlain(Followed[PlainFilter]):
 
     def observe(self, evidence: Evidence) -> None:
         """Take in the evidence of a look, the last of the history, and learn from it."""
-        self.filter.observe(evidence)
-        self.filter.learn_from(self._history, len(self._history.evidence) - 1)
+        self.filter.observe(evidence, self._history.step(len(self._history.evidence) - 1))
 
     def components(self, belief: FloatArray) -> list[BeliefComponent]:
         """Return the component of each probable object.

@@ -22,12 +22,13 @@ from atg_fg.core.patterns import Evidence, FloatArray, IntArray
 from atg_fg.core.records import Mistake
 from atg_fg.engines.bayes_filter import BayesFilter
 from atg_fg.engines.followed import FollowedChain, FollowedPlain, FollowedStructure
+from atg_fg.engines.tables_on_demand import TablesOnDemand
 from atg_fg.inference.belief_components import LEAST_PROBABILITY, BeliefComponent, components_of, shown_patterns_of
 from atg_fg.inference.belief_tree import BeliefNode
 from atg_fg.inference.chain import Chain
 from atg_fg.inference.explanations import best_explanations
 from atg_fg.inference.interface import TrialSetup
-from atg_fg.inference.recognition_model import COLLECTION, RecognitionModel
+from atg_fg.inference.recognition_model import COLLECTION
 from atg_fg.learning.believed_structure import BelievedStructure
 from atg_fg.learning.object_kinds import PLAIN_WORDS
 from atg_fg.learning.pose_belief_tree import FilteredBelief, Following, StructureBelief
@@ -97,7 +98,7 @@ class LearnedStructure(BayesFilter):
         if members.max() < NEGLIGIBLE:
             return
         self._log_plain = log_of(np.maximum(1.0 - followers - members, 0.0))
-        model = RecognitionModel(memory, uncertain.noise.parameters, self.prior)
+        model = TablesOnDemand(memory, uncertain.noise.parameters, self.prior, graphs=list(memory))
         self._followed.append(FollowedPlain(model, log_of(model.prior * members), self.history))
 
     def _follow_chains(self, memory: StructuredMemory) -> None:

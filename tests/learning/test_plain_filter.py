@@ -25,8 +25,7 @@ def test_each_hypothesis_is_filtered_as_by_the_bayes_filter(seed):
             return  # an impossible look, which the engine refuses
         engine.observe(evidence)
         history.evidence.append(evidence)
-        own.observe(evidence)
-        own.learn_from(history, time)
+        own.observe(evidence, history.step(time))
         joint = np.exp(log_of(model.prior) + own.log_evidence)
         np.testing.assert_allclose(joint / joint.sum(), np.exp(engine._belief.log_identity), atol=1e-9)
         np.testing.assert_allclose(joint[:, None] * own.aspects / joint.sum(), engine.aspect_belief, atol=1e-9)

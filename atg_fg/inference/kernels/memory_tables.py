@@ -23,6 +23,9 @@ _MOST_MORE: Final = 1000
 #: Types of states and of patterns.
 Types = tuple[type[np.unsignedinteger[Any]], type[np.unsignedinteger[Any]]]
 
+#: α of which tables are kept: that of an engine, and that of plain ATGs whose actions are uncertain beside it.
+_CONCENTRATIONS: Final = 2
+
 #: Trials whose arrays are kept: one that has ended, and the one before it, as the next begins before it is gone.
 _SPARE: Final = 2
 
@@ -203,6 +206,7 @@ def arrays_for_trial(memory: RobotMemory, concentration: float, trial: object, *
         weakref.finalize(memory, _kept.pop, id(memory), None)
     kept = _kept[id(memory)]
     if concentration not in kept:
-        kept.clear()  # of one α at a time
+        if len(kept) == _CONCENTRATIONS:
+            kept.pop(next(iter(kept)))
         kept[concentration] = MemoryTables(memory, concentration)
     return kept[concentration].lend(memory, trial, extends=extends)
