@@ -22,25 +22,24 @@ Known = tuple[FloatArray, FloatArray]
 
 @written_out
 def probability_of_look(
-    owner: IntArray, table: IntArray, in_view: IntArray, possible: FloatArray, shown: FloatArray, seen: IntArray
+    rows: Rows, registers: IntArray, possible: FloatArray, shown: FloatArray, seen: IntArray
 ) -> FloatArray:
     """Return p(what was seen | row, the look is not wrong), shape [R].
 
     Args:
-        owner: Of each row, shape [R].
-        table: Of each row, shape [R].
-        in_view: The register in each slot, shape [R, J].
-        possible: 1 where slots show different registers, else 0, shape [R].
+        rows: What is believed.
+        registers: The register in each slot of each pose, shape [P', J].
+        possible: 1 where slots show different registers, else 0, of each pose, shape [P'].
         shown: The probability of each symbol in each register of each table, shape [K, P, S].
         seen: The symbol in each slot, of each owner, shape [H, J].
     """
+    owner, _, pose, _, table, _ = rows
     result = np.empty(len(owner))
     n_slots = seen.shape[1]
     for row in range(len(owner)):
-        of = shown[table[row]]
-        probability = possible[row] / max(different(of, in_view[row]), TINY)
+        probability = possible[pose[row]] / max(different(shown[table[row]], registers[pose[row]]), TINY)
         for slot in range(n_slots):
-            probability *= of[in_view[row, slot], seen[owner[row], slot]]
+            probability *= shown[table[row], registers[pose[row], slot], seen[owner[row], slot]]
         result[row] = probability
     return result
 
@@ -282,9 +281,10 @@ def show(contents: FloatArray, repeat: float, shown: FloatArray) -> None:
             absent[symbol] *= max(1.0 - contents[register, symbol], TINY)
     for register in range(n_registers):
         known, total = 0.0, 0.0
+        for symbol in range(n_symbols):  # by itself: the compiler then has several divisions done at once
+            shown[register, symbol] = absent[symbol] / max(1.0 - contents[register, symbol], TINY)
         for symbol in range(n_symbols):
             known += contents[register, symbol]
-            shown[register, symbol] = absent[symbol] / max(1.0 - contents[register, symbol], TINY)
             total += shown[register, symbol]
         rest = max(1.0 - known, 0.0)
         for symbol in range(n_symbols):
@@ -321,14 +321,15 @@ def follow(
     for look in range(len(seen)):
         if look > 0:
             rows = act(rows, successors, actions[look - 1], (slip, slip_again))
-        owner, start, pose, weight, table, events = rows
-        in_view = registers[pose]
-        probability = probability_of_look(owner, table, in_view, possible[pose], known[1], seen[look])
+        right = probability_of_look(rows, registers, possible, known[1], seen[look])
+        for row in range(len(right)):
+            right[row] *= 1.0 - wrong
         wrong_look = np.full(len(log_evidence), wrong_pattern)
-        kept, truth, weight = weigh(owner, weight, ((1.0 - wrong) * probability, wrong_look), log_evidence, log_weights)
-        rows = (owner[kept], start[kept], pose[kept], weight, table[kept], events[kept])
+        kept, truth, weight = weigh(rows[0], rows[3], (right, wrong_look), log_evidence, log_weights)
+        rows = rows_with(rows, kept, weight)
+        events = rows[5]
         for row in range(len(truth)):
-            rows[5][row, WRONG] += 1.0 - truth[row]
+            events[row, WRONG] += 1.0 - truth[row]
         tables, changed = reveal(rows, known, registers, seen[look], truth, repeat)
         rows, known = merged(rows, known, tables, changed, (n_starts, len(registers)), repeat)
     return rows, known
@@ -340,24 +341,39 @@ def act(rows: Rows, successors: IntArray, actions: IntArray, slips: tuple[float,
 
     A slip is the more probable the more probably the action failed when it was last done.
     """
-    owner, start, pose, weight, table, events = rows
-    n_rows = len(owner)
-    both = np.empty(2 * n_rows, np.int64)
+    n_rows = len(rows[0])
+    both, weights = np.empty(2 * n_rows, np.int64), np.empty(2 * n_rows)
     for row in range(n_rows):
         both[row] = both[n_rows + row] = row
-    acted = (owner[both], start[both], pose[both], weight[both], table[both], events[both])
+        weights[row] = weights[n_rows + row] = rows[3][row]
+    acted = rows_with(rows, both, weights)
+    owner, _, pose, weight, _, events = acted
     for row in range(n_rows):
-        action, moved, stayed = actions[owner[row]], acted[5][row], acted[5][n_rows + row]
-        failed_before = moved[FAILED + action]
+        stayed, action = n_rows + row, actions[owner[row]]
+        failed_before = events[row, FAILED + action]
         again = failed_before * slips[1]
         slip = (1.0 - failed_before) * slips[0] + again
-        acted[2][row] = successors[pose[row], action]
-        acted[3][row] *= 1.0 - slip
-        acted[3][n_rows + row] *= slip
-        moved[FAILED_BEFORE] += (failed_before - again) / (1.0 - slip)
-        moved[FAILED + action] = 0.0
-        stayed[SLIP] += 1.0
-        stayed[AGAIN] += again / slip
-        stayed[FAILED_BEFORE] += again / slip
-        stayed[FAILED + action] = 1.0
+        pose[row] = successors[pose[row], action]
+        weight[row] *= 1.0 - slip
+        weight[stayed] *= slip
+        events[row, FAILED_BEFORE] += (failed_before - again) / (1.0 - slip)
+        events[row, FAILED + action] = 0.0
+        events[stayed, SLIP] += 1.0
+        events[stayed, AGAIN] += again / slip
+        events[stayed, FAILED_BEFORE] += again / slip
+        events[stayed, FAILED + action] = 1.0
     return acted
+
+
+@compiled_within
+def rows_with(rows: Rows, index: IntArray, weight: FloatArray) -> Rows:
+    """Return the rows with these indices, and with other weights."""
+    owner, start, pose, _, table, events = rows
+    owners, starts, poses = np.empty_like(index), np.empty_like(index), np.empty_like(index)
+    tables, all_events = np.empty_like(index), np.empty((len(index), events.shape[1]))
+    for place in range(len(index)):
+        row = index[place]
+        owners[place], starts[place], poses[place], tables[place] = owner[row], start[row], pose[row], table[row]
+        for event in range(events.shape[1]):
+            all_events[place, event] = events[row, event]
+    return owners, starts, poses, weight, tables, all_events
