@@ -169,13 +169,13 @@ FAULTS = [
     Fault(
         "kinds: all are as probable beforehand",
         "learning/kinds.py",
-        "return np.array([*PLAIN_BEFORE, *[1.0] * (table.shape[1] - N_PLAIN)])",
-        "return np.ones(table.shape[1])",
+        "return np.array([*PLAIN_BEFORE, *[1.0] * (n_kinds - N_PLAIN)])",
+        "return np.ones(n_kinds)",
     ),
     Fault(
         "kinds: a trial with too many errors is one of the kind",
         "learning/kinds.py",
-        "np.minimum(evidence, most - REFUSED)",
+        "np.minimum(evidence, plain.max(axis=1) - REFUSED)",
         "evidence",
     ),
     Fault(
@@ -217,20 +217,20 @@ FAULTS = [
     Fault(
         "poses: an action that fails has led on as well",
         "learning/pose_kernels.py",
-        "acted[3][row] *= 1.0 - slip",
-        "acted[3][row] *= 1.0",
+        "weight[row] *= 1.0 - slip",
+        "weight[row] *= 1.0",
     ),
     Fault(
         "poses: an action that turned the object still counts as failed",
         "learning/pose_kernels.py",
-        "moved[FAILED + action] = 0.0",
-        "moved[FAILED + action] = failed_before",
+        "events[row, FAILED + action] = 0.0",
+        "events[row, FAILED + action] = failed_before",
     ),
     Fault(
         "poses: which action failed is not remembered",
         "learning/pose_kernels.py",
-        "stayed[FAILED + action] = 1.0",
-        "stayed[FAILED + action] = failed_before",
+        "events[stayed, FAILED + action] = 1.0",
+        "events[stayed, FAILED + action] = failed_before",
     ),
     Fault(
         "poses: what is predicted leaves out which action failed",
@@ -247,8 +247,8 @@ FAULTS = [
     Fault(
         "kinds: an action that fails over and over counts each time",
         "learning/kinds.py",
-        "events = wrong + kind.events[:, SLIP] - kind.events[:, AGAIN]",
-        "events = wrong + kind.events[:, SLIP]",
+        "wrong + events[..., SLIP] - events[..., AGAIN] > most_events",
+        "wrong + events[..., SLIP] > most_events",
     ),
     Fault(
         "rates: whether slips come together is told by the kinds in force",

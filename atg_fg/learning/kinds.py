@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterable, Sequence
+from functools import cache
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -89,26 +90,27 @@ def kind_table(kinds: Sequence[Candidate], plain: FloatArray, rates: Rates, give
     excess_events = excess_wrong + max(rates.slip - PRIOR_RATES.slip, 0.0) * (n_looks - 1)
     most_wrong = WRONG_LIMIT[0] + WRONG_LIMIT[1] * n_looks + EXCESS_FACTOR * excess_wrong
     most_events = EVENT_LIMIT[0] + EVENT_LIMIT[1] * n_looks + EXCESS_FACTOR * excess_events
-    columns, most = [plain], plain.max(axis=1)
-    for kind in kinds:
-        wrong = kind.events[:, WRONG]
-        events = wrong + kind.events[:, SLIP] - kind.events[:, AGAIN]
-        errs = (wrong > most_wrong) | (events > most_events)
-        evidence = kind.log_evidence[given]
-        columns.append(np.where(errs, np.minimum(evidence, most - REFUSED), evidence))
-    return np.column_stack(columns)
+    events = np.array([kind.events for kind in kinds])
+    wrong = events[..., WRONG]
+    errs = (wrong > most_wrong) | (wrong + events[..., SLIP] - events[..., AGAIN] > most_events)
+    evidence = np.array([kind.log_evidence[given] for kind in kinds])
+    table = np.empty((len(plain), N_PLAIN + len(kinds)))
+    table[:, :N_PLAIN] = plain
+    table[:, N_PLAIN:] = np.where(errs, np.minimum(evidence, plain.max(axis=1) - REFUSED), evidence).T
+    return table
 
 
 def share_kinds(table: FloatArray) -> KindShares:
     """Return which kind each row is of, given ln p(row | kind), shape [n, 2 + K]."""
     from atg_fg.learning import kind_kernels  # they load Numba
 
-    return KindShares(*kind_kernels.share_out(np.ascontiguousarray(table), _before(table), _ROUNDS))
+    return KindShares(*kind_kernels.share_out(np.ascontiguousarray(table), _before(table.shape[1]), _ROUNDS))
 
 
-def _before(table: FloatArray) -> FloatArray:
-    """Return the Dirichlet concentration of each column."""
-    return np.array([*PLAIN_BEFORE, *[1.0] * (table.shape[1] - N_PLAIN)])
+@cache
+def _before(n_kinds: int) -> FloatArray:
+    """Return the Dirichlet concentration of each kind, plain ones included; not to be written to."""
+    return np.array([*PLAIN_BEFORE, *[1.0] * (n_kinds - N_PLAIN)])
 
 
 def evidence_of_sets(table: FloatArray, sets: Sequence[Iterable[int]]) -> list[float]:
@@ -121,17 +123,13 @@ def evidence_of_sets(table: FloatArray, sets: Sequence[Iterable[int]]) -> list[f
         for kind in kinds:
             members[number, N_PLAIN + kind] = True
     table = np.ascontiguousarray(table)  # the loop is compiled anew for what is laid out otherwise
-    result: list[float] = kind_kernels.evidence_of_sets(table, _before(table), members, _ROUNDS).tolist()
+    result: list[float] = kind_kernels.evidence_of_sets(table, _before(table.shape[1]), members, _ROUNDS).tolist()
     return result
 
 
-def evidence_alone(pool: Sequence[Candidate], table: FloatArray, numbers: Sequence[int]) -> dict[int, float]:
-    """Return ln p(all trials) of some structures of a pool, each the only one, its prior included."""
-    evidence = evidence_of_sets(table, [[number] for number in numbers])
-    return {number: of + pool[number].structure.log_prior for number, of in zip(numbers, evidence, strict=True)}
-
-
-def choose_kinds(pool: Sequence[Candidate], plain: FloatArray, rates: Rates) -> list[KindSet]:
+def choose_kinds(
+    pool: Sequence[Candidate], plain: FloatArray, rates: Rates, known: dict[frozenset[int], float] | None = None
+) -> list[KindSet]:
     """Return the sets of kinds that are believed in, best first: the best, and its best neighbours if not far behind.
 
     From none, the change that gains most is made for as long as there is one: one structure more, one less, one for
@@ -141,9 +139,10 @@ def choose_kinds(pool: Sequence[Candidate], plain: FloatArray, rates: Rates) -> 
         pool: Structures, scored on all trials.
         plain: ln p(trial | plain) of the two plain kinds, shape [n, 2].
         rates: Those in force.
+        known: Gets ln p(all trials) of each set that was looked at, its prior included: of none and of each alone, too.
     """
     table = kind_table(pool, plain, rates)
-    known: dict[frozenset[int], float] = {}
+    known = {} if known is None else known
     made: dict[frozenset[int], KindSet | None] = {}
 
     def of(kinds: frozenset[int]) -> KindSet | None:

@@ -23,7 +23,6 @@ from atg_fg.learning.kinds import (
     UNCERTAIN_KIND,
     KindSet,
     choose_kinds,
-    evidence_alone,
     kind_table,
     share_kinds,
     tally_events,
@@ -84,7 +83,9 @@ class StructureLearner:
         self._candidates: list[Candidate] = []
         self._chosen: list[KindSet] = []
         self._n_chosen_from = -1
-        #: p(kind | its trials) of each object, by the structures of a set, shape [K, 2 + structures]
+        #: ln p(all trials) of sets of candidates
+        self._evidence_of_sets: dict[frozenset[int], float] = {}
+        #: p(kind | its trials) of each object, one without and one never met, by a set's structures, [K + 2, 2 + those]
         self._kinds_of_objects: dict[tuple[int, ...], FloatArray] = {}
 
     def learn(self, owner: str, trial: RawTrial, *, rests: bool = False) -> None:
@@ -185,7 +186,7 @@ class StructureLearner:
         """
         if not self._sets or not self._sets[0].structures:
             return -np.inf
-        return self._sets[0].log_evidence - share_kinds(self._of_plain()).log_evidence
+        return self._sets[0].log_evidence - self._evidence_of_sets[frozenset()]
 
     @property
     def log_evidence(self) -> float:
@@ -249,15 +250,12 @@ class StructureLearner:
             np.add.at(by_object, self._owner_indices, by_trial)
             by_object += np.log(shares)
             by_object = np.exp(by_object - by_object.max(axis=1, keepdims=True))
-            self._kinds_of_objects[kinds.structures] = by_object / by_object.sum(axis=1, keepdims=True)
-        by_object = self._kinds_of_objects[kinds.structures]
-        of = np.zeros((len(names) + 1, len(shares)))
-        of[-1] = shares
-        for position, name in enumerate(names):
-            if name in self._objects:
-                of[position] = by_object[self._objects[name]]
-            else:
-                of[position, :N_PLAIN] = shares[:N_PLAIN] / shares[:N_PLAIN].sum()
+            by_object /= by_object.sum(axis=1, keepdims=True)
+            without = np.append(shares[:N_PLAIN] / shares[:N_PLAIN].sum(), np.zeros(len(shares) - N_PLAIN))
+            self._kinds_of_objects[kinds.structures] = np.vstack((by_object, without, shares))
+        of: FloatArray = self._kinds_of_objects[kinds.structures][
+            [*(self._objects.get(name, -2) for name in names), -1]
+        ]
         return of
 
     def _of_plain(self) -> FloatArray:
@@ -343,13 +341,10 @@ class StructureLearner:
         """Choose the sets of kinds, and keep their structures and those that are best beside them."""
         self._choose()
         kept = list(dict.fromkeys(number for each in self._sets for number in each.structures))
-        plain, others = self._of_plain(), [number for number in range(len(self._candidates)) if number not in kept]
-        nothing = share_kinds(plain).log_evidence
-        table = kind_table(self._candidates, plain, self.rates)
-        alone = evidence_alone(self._candidates, table, others)
-        spare = sorted(
-            (number for number in alone if alone[number] > nothing - KEPT_WITHIN), key=lambda number: -alone[number]
-        )
+        others = [number for number in range(len(self._candidates)) if number not in kept]
+        alone = {number: self._evidence_of_sets[frozenset((number,))] for number in others}
+        least = self._evidence_of_sets[frozenset()] - KEPT_WITHIN
+        spare = sorted((number for number in alone if alone[number] > least), key=lambda number: -alone[number])
         kept += spare[: max(MAX_CANDIDATES - len(kept), 0)]
         if kept != list(range(len(self._candidates))):
             self._candidates = [self._candidates[number] for number in kept]
@@ -363,7 +358,9 @@ class StructureLearner:
         self._plain.catch_up(self.trials, self.owners)
         for each in self._candidates:
             each.catch_up(self.trials, self._owner_indices, self.rates)
-        self._chosen = choose_kinds(self._candidates, self._of_plain(), self.rates) if self.trials else []
+        self._chosen, self._evidence_of_sets = [], {}
+        if self.trials:
+            self._chosen = choose_kinds(self._candidates, self._of_plain(), self.rates, self._evidence_of_sets)
 
     def _rescore(self) -> None:
         self._plain.forget()

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from atg_fg.core.patterns import FloatArray, IntArray
-from atg_fg.inference.kernels.compilation import ZERO, compiled, compiled_within, written_out
+from atg_fg.inference.kernels.compilation import ZERO, compiled, compiled_within
 from atg_fg.learning.kernels import add_share, copy_into
 from atg_fg.learning.rates import AGAIN, FAILED, FAILED_BEFORE, REPEAT, REVEAL, SLIP, WRONG
 from atg_fg.learning.register_contents import SAME, TINY
@@ -20,7 +20,7 @@ Rows = tuple[IntArray, IntArray, IntArray, FloatArray, IntArray, FloatArray]
 Known = tuple[FloatArray, FloatArray]
 
 
-@written_out
+@compiled_within
 def probability_of_look(
     rows: Rows, registers: IntArray, possible: FloatArray, shown: FloatArray, seen: IntArray
 ) -> FloatArray:
@@ -127,7 +127,7 @@ def importance_of(log_evidence: FloatArray, log_weights: FloatArray) -> FloatArr
     return importance
 
 
-@written_out
+@compiled_within
 def reveal(
     rows: Rows, known: Known, registers: IntArray, seen: IntArray, truth: FloatArray, repeat: float
 ) -> tuple[FloatArray, IntArray]:
@@ -144,23 +144,18 @@ def reveal(
     owner, _, pose, _, of_row, events = rows
     contents, shown = known
     n_symbols = contents.shape[2]
-    tables = np.empty((len(owner), contents.shape[1], n_symbols))
     changed, n_changed = np.empty(len(owner), np.int64), 0
     for row in range(len(owner)):
         if truth[row] <= SAME:
             continue
-        table, is_known = tables[n_changed], True
-        copy_into(table, contents[of_row[row]])
-        for slot in range(seen.shape[1]):
-            # What shows nothing but what is known for certain leaves a table as it is.
-            is_known = is_known and table[registers[pose[row], slot], seen[owner[row], slot]] > 1.0 - SAME
+        is_known = True
         for slot in range(seen.shape[1]):
             register, symbol = registers[pose[row], slot], seen[owner[row], slot]
-            before, rest = table[register, symbol], 0.0
+            before, rest = contents[of_row[row], register, symbol], 0.0
+            # What shows nothing but what is known for certain leaves a table as it is.
+            is_known = is_known and before > 1.0 - SAME
             for each in range(n_symbols):
-                rest += table[register, each]
-                table[register, each] *= 1.0 - truth[row]
-            table[register, symbol] += truth[row]
+                rest += contents[of_row[row], register, each]
             expected = shown[of_row[row], register, symbol]
             revealed = truth[row] * (1.0 - before / max(expected, TINY))
             from_all = repeat / n_symbols * max(1.0 - rest, 0.0)
@@ -169,7 +164,16 @@ def reveal(
         if not is_known:
             changed[n_changed] = row
             n_changed += 1
-    return tables[:n_changed], changed[:n_changed]
+    tables = np.empty((n_changed, contents.shape[1], n_symbols))
+    for index in range(n_changed):
+        row, table = changed[index], tables[index]
+        copy_into(table, contents[of_row[row]])
+        for slot in range(seen.shape[1]):
+            register, symbol = registers[pose[row], slot], seen[owner[row], slot]
+            for each in range(n_symbols):
+                table[register, each] *= 1.0 - truth[row]
+            table[register, symbol] += truth[row]
+    return tables, changed[:n_changed]
 
 
 @compiled
@@ -193,9 +197,7 @@ def merged(
     contents, shown = known
     n_starts, n_poses = sizes
     n_rows, n_old, n_new = len(owner), len(contents), 0
-    everything = np.empty((n_old + len(tables), contents.shape[1], contents.shape[2]))
-    for each in range(len(everything)):
-        copy_into(everything[each], contents[each] if each < n_old else tables[each - n_old])
+    n_tables = n_old + len(tables)  # the new ones have the next numbers
     table, key, n_owners = of_row.copy(), np.empty(n_rows, np.int64), ZERO
     for index in range(len(changed)):
         table[changed[index]] = n_old + index
@@ -205,7 +207,7 @@ def merged(
     order = in_order(owner, n_owners, in_order(start, n_starts, in_order(pose, n_poses, np.arange(n_rows))))
     begins, weights, numbers = np.empty(n_rows, np.int64), np.zeros(n_rows), np.empty(n_rows, np.int64)
     last = np.empty(n_rows, np.int64)
-    expected, is_used, n_mixed = np.zeros((n_rows, events.shape[1])), np.zeros(len(everything), np.bool_), 0
+    expected, is_used, n_mixed = np.zeros((n_rows, events.shape[1])), np.zeros(n_tables, np.bool_), 0
     place = 0
     while place < n_rows:
         first, is_mixed = place, False
@@ -225,17 +227,18 @@ def merged(
             is_used[numbers[n_new]] = True
         begins[n_new], last[n_new] = first, order[place - 1]
         n_new += 1
-    number, n_left = np.empty(len(everything), np.int64), 0
+    number, n_left = np.empty(n_tables, np.int64), 0
     left = np.zeros((is_used.sum() + n_mixed, contents.shape[1], contents.shape[2]))
     shown_left = np.empty_like(left)
-    for old in range(len(everything)):
+    for old in range(n_tables):
         if is_used[old]:
             number[old] = n_left
-            copy_into(left[n_left], everything[old])
             if old < n_old:
+                copy_into(left[n_left], contents[old])
                 copy_into(shown_left[n_left], shown[old])
             else:
-                show(everything[old], repeat, shown_left[n_left])
+                copy_into(left[n_left], tables[old - n_old])
+                show(left[n_left], repeat, shown_left[n_left])
             n_left += 1
     for new in range(n_new):
         if numbers[new] >= 0:
@@ -245,7 +248,11 @@ def merged(
             member = order[place]
             if key[member] != key[last[new]]:
                 break
-            add_share(weight[member] / max(weights[new], _LEAST), everything[table[member]], left[n_left])
+            share = weight[member] / max(weights[new], _LEAST)
+            if table[member] < n_old:
+                add_share(share, contents[table[member]], left[n_left])
+            else:
+                add_share(share, tables[table[member] - n_old], left[n_left])
         show(left[n_left], repeat, shown_left[n_left])
         numbers[new] = n_left
         n_left += 1
