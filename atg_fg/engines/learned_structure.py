@@ -71,7 +71,7 @@ class LearnedStructure(BayesFilter):
 
     def __init__(self, setup: TrialSetup) -> None:
         super().__init__(setup)
-        self._known: tuple[list[FloatArray], float, list[FloatArray]] | None = None
+        self._known: tuple[float, list[FloatArray]] | None = None
         believed: list[BelievedStructure] = []
         rates = Rates()
         memory = self.memory if self.parameters.learn_structure else None
@@ -145,7 +145,7 @@ class LearnedStructure(BayesFilter):
         """Return ln p(z_0:t | a_1:t)."""
         if not self._followed:
             return super().log_evidence
-        return self._beliefs()[1] + self._log_scale
+        return self._beliefs()[0] + self._log_scale
 
     def conclude(self) -> IdentityBelief:
         """Return the belief at the end of the trial, all raw trials of the memory sampled again in its light.
@@ -231,21 +231,21 @@ class LearnedStructure(BayesFilter):
                     found.append(KindExplanation(words, hypothesis, patterns, probability))
         return sorted(found, key=lambda each: -each.probability)[:k]
 
-    def _beliefs(self) -> tuple[list[FloatArray], float, list[FloatArray]]:
-        """Return ln p(O, type, z_0:t | a_1:t), ln p(z_0:t | a_1:t) but for its scale, and p(O, type | z_0:t, a_1:t).
+    def _beliefs(self) -> tuple[float, list[FloatArray]]:
+        """Return ln p(z_0:t | a_1:t) but for its scale, and p(O, type | z_0:t, a_1:t).
 
-        Of being plain, then of following each structure, each of shape [H]; kept until there is another look.
+        The latter of being plain, then of following each structure, each of shape [H]; kept until the next look.
         """
         if self._known is None:
             plain = self._log_plain + self._log_identity + self.scaled_log_evidence
-            joints = [plain, *(each.log_joint for each in self._followed)]
-            total = log_sum_exp(np.concatenate(joints))
-            self._known = joints, total, [np.exp(joint - total) for joint in joints]
+            joints = np.array([plain, *(each.log_joint for each in self._followed)])
+            total = log_sum_exp(joints)
+            self._known = total, list(np.exp(joints - total))
         return self._known
 
     def _type_beliefs(self) -> list[FloatArray]:
         """Return p(O, type | z_0:t, a_1:t) of being plain, then of following each structure, each of shape [H]."""
-        return self._beliefs()[2]
+        return self._beliefs()[1]
 
     def _plain_aspects(self, type_beliefs: list[FloatArray]) -> FloatArray:
         """Return p(O, X_t, plain | z_0:t, a_1:t), shape [H, W]."""

@@ -125,7 +125,8 @@ class PoseFilter:
     def observe_pattern(self, symbols: IntArray) -> None:
         """Take in looks that showed every slot, shape [J], or [H, J] for a look of each owner."""
         n_owners = len(self.log_evidence)
-        seen = np.array(np.broadcast_to(symbols, (1, n_owners, symbols.shape[-1])), order="C")
+        seen = np.empty((1, n_owners, symbols.shape[-1]), dtype=np.int64)
+        seen[:] = symbols
         self.follow(np.zeros((0, n_owners), dtype=np.int64), seen)
 
     def follow(self, actions: IntArray, symbols: IntArray) -> None:
