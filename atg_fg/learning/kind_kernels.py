@@ -31,7 +31,7 @@ def log_evidence_of_each(
     Args:
         tables: What H hypotheses know, with room for what the trial finds, ``Tables``; not changed.
         sizes: |G| and |𝒵|.
-        grid: α and δ, shape [N, 2].
+        grid: α and δ, shape [N, 2]; rows of the same α are weighed once if they lie together.
         evidence: Likelihood of each pattern at each look, shape [T + 1, |𝒵|].
         actions: Between the looks, shape [T].
         patterns: Pattern of each look, −1 if it was not complete, shape [T + 1].
@@ -40,10 +40,12 @@ def log_evidence_of_each(
     n_rows, width = pattern.shape
     result = np.empty((len(grid), n_rows))
     aspects, log_identity, identity = np.zeros((n_rows, width)), np.zeros(n_rows), np.zeros(n_rows)
+    weighed = (n_known, pattern, begins, edges, counted, probability.copy())
     for number in range(len(grid)):
-        own = (n_known.copy(), pattern.copy(), begins.copy(), edges.copy(), counted.copy(), probability.copy())
         constants = (sizes[0], sizes[1], grid[number, 0], grid[number, 1])
-        weigh_all(own, constants[2])
+        if number == 0 or grid[number, 0] != grid[number - 1, 0]:
+            weigh_all(weighed, constants[2])
+        own = (n_known.copy(), pattern.copy(), begins.copy(), edges.copy(), counted.copy(), weighed[5].copy())
         log_identity[:] = 0.0
         total, shown, shown_pattern = 0.0, np.zeros_like(n_known), NONE
         for time in range(len(evidence)):
