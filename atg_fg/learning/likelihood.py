@@ -11,7 +11,7 @@ import numpy as np
 from atg_fg.core.patterns import MISSING, FloatArray, PatternAlphabet
 from atg_fg.learning.pose_filter import PoseFilter
 from atg_fg.learning.rates import FAILED, Rates
-from atg_fg.learning.raw_trials import RawTrial, TrialArrays, side_by_side
+from atg_fg.learning.raw_trials import RawTrial
 from atg_fg.learning.shared_structure import SharedStructure
 
 #: What a trial's evidence is given: an object never met, the object that it is filed under, or all trials before it,
@@ -57,7 +57,7 @@ def score_trials(
         by_length[len(trial.actions)].append(number)
     for numbers in by_length.values():
         own = PoseFilter(structure.poses(), before[numbers], rates, alphabet)
-        follow(own, side_by_side([trials[number] for number in numbers]), alphabet)
+        follow(own, [trials[number] for number in numbers], alphabet)
         scores.log_evidence[numbers] = own.log_evidence
         scores.events[numbers] = own.expected_events()
         learned, is_possible = own.learned()
@@ -65,9 +65,11 @@ def score_trials(
     return scores
 
 
-def follow(own: PoseFilter, trials: TrialArrays, alphabet: PatternAlphabet) -> None:
+def follow(own: PoseFilter, trials: Sequence[RawTrial], alphabet: PatternAlphabet) -> None:
     """Let a filter go through trials of the same length, one of each owner."""
-    looks, actions = np.ascontiguousarray(trials.symbols.transpose(1, 0, 2)), np.ascontiguousarray(trials.actions.T)
+    seen = np.concatenate([trial.symbols for trial in trials], axis=1)
+    looks = seen.reshape(len(seen), len(trials), -1)
+    actions = np.array([trial.actions for trial in trials], dtype=np.int64).T.copy()
     if (looks != MISSING).all():
         own.follow(actions, looks)
         return
