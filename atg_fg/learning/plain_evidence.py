@@ -7,7 +7,9 @@ depends on what was thought of α.
 
 from __future__ import annotations
 
+import itertools
 import math
+from collections import Counter, defaultdict
 from collections.abc import Sequence
 from typing import Final, NamedTuple
 
@@ -68,6 +70,8 @@ class PlainEvidence:
     def forget(self) -> None:
         """Know no trial."""
         self._graphs: dict[str, AspectTransitionGraph] = {}
+        #: Names of the ATGs that show a pattern
+        self._showing: defaultdict[int, set[str]] = defaultdict(set)
         self.log_evidence: FloatArray = np.zeros((3, 0, 1 + len(UNCERTAIN)))
 
     def catch_up(self, trials: Sequence[RawTrial], owners: Sequence[str]) -> None:
@@ -81,7 +85,7 @@ class PlainEvidence:
         alphabet = self._assumptions.alphabet
         looks = [Evidence.of_detection(alphabet, detection) for detection in trial.detections]
         patterns = [look.pattern for look in looks]
-        rivals = self._rivals(set(patterns) - {None}, owner)
+        rivals = self._rivals({pattern for pattern in patterns if pattern is not None}, owner)
         of_each = self._of_each([self._graphs[name] for name in rivals], looks, trial.actions)
         fresh = of_each[:, -1]
         n_objects = max(self._assumptions.n_objects, len(self._graphs) + 1)
@@ -91,13 +95,16 @@ class PlainEvidence:
         if owner not in self._graphs:
             self._graphs[owner] = AspectTransitionGraph(owner, self._assumptions)
         self._graphs[owner].learn(patterns, trial.actions)
+        for pattern in self._graphs[owner].pattern_indices:
+            self._showing[pattern].add(owner)
         return np.array([fresh, filed, before])
 
-    def _rivals(self, patterns: set[int | None], owner: str) -> list[str]:
+    def _rivals(self, patterns: set[int], owner: str) -> list[str]:
         """Return the names of the ATGs that a trial may be of; with others it shares next to nothing."""
-        shared = {name: len(patterns.intersection(graph.pattern_indices)) for name, graph in self._graphs.items()}
-        likely = sorted((name for name in shared if shared[name] >= LEAST_SHARED), key=lambda name: -shared[name])
-        return list(dict.fromkeys([*([owner] if owner in shared else []), *likely[:MOST_RIVALS]]))
+        shared = Counter(itertools.chain.from_iterable(self._showing[pattern] for pattern in patterns))
+        enough = (name for name in self._graphs if shared.get(name, 0) >= LEAST_SHARED)
+        likely = sorted(enough, key=lambda name: -shared[name])
+        return list(dict.fromkeys([*([owner] if owner in self._graphs else []), *likely[:MOST_RIVALS]]))
 
     def _of_each(
         self, graphs: Sequence[AspectTransitionGraph], looks: Sequence[Evidence], actions: Sequence[int]

@@ -159,8 +159,7 @@ def _part(tables: Tables, n_rows: int, n_edges: int) -> Tables:
 
 def types_for(assumptions: Assumptions) -> Types:
     """Return the types of the arrays: small ones where they suffice, else large ones; each is compiled by itself."""
-    is_small = max(assumptions.n_aspects, len(assumptions.actions)) <= np.iinfo(np.uint8).max
-    is_small &= len(assumptions.alphabet) <= np.iinfo(np.uint16).max
+    is_small = max(assumptions.n_aspects, len(assumptions.actions)) < 2**8 and len(assumptions.alphabet) < 2**16
     return (np.uint8, np.uint16) if is_small else (np.uint32, np.uint32)
 
 
