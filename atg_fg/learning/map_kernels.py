@@ -13,7 +13,8 @@ from atg_fg.learning.kernels import TrialArrays, copy_into, draw_by_logarithm, s
 _KNOWN_BITS = 13
 #: Histories whose evidence is at hand, 2 to the power of this.
 _HISTORY_BITS = 16
-#: Maps that are followed side by side: of each, a place has so many bits of one number.
+#: Maps that are followed side by side: of each, a place has so many bits of one number. No map that is searched for has
+#: as many as 256 registers.
 _LANES, _LANE_BITS, _LANE = 8, np.uint64(8), np.uint64(0xFF)
 _EVERY_LANE = np.uint64(0x0101010101010101)
 #: Of two numbers this far apart the smaller adds nothing to ln (exp + exp).
@@ -181,7 +182,17 @@ def log_evidence_of(
     shown: Indices,
     product: FloatArray,
 ) -> float:
-    """Return ln of how probable it is that a register shows what it does in a trial, in the lane with this shift."""
+    """Return ln of how probable it is that a register shows what it does in a trial.
+
+    Args:
+        register: Where the trial begins.
+        shift: Bits below those of the lane in ``places``.
+        looks: Number of the look of each slot at each time, shape [T, J].
+        histories: For the looks that these numbers mean.
+        places: The register in each place at each look, in all lanes, shape [T, P].
+        shown: Room for the looks that the register shows, shape [T · J + 1].
+        product: Room for the product of their likelihoods, shape [V].
+    """
     _, rows, _, prior, _, _ = histories
     n_shown = 0
     for time in range(len(looks)):
@@ -298,6 +309,19 @@ def score_moves(
     """Fill in the evidence of the maps after each move, less what actions cost that lose content.
 
     Once a chain is cold, most maps that it looks at are those that it looked at before.
+
+    Args:
+        sources: Before the moves, shape [A, P].
+        code: The sources of each action as one number, shape [A].
+        action: Whose sources move.
+        register: That moves.
+        fresh: Trials of fresh objects.
+        known: Maps whose evidence is at hand; others are added.
+        tried: Room for the moves that lead to other maps [M], and for where each map is in the table, and the code of
+            the action in it [2, M].
+        work: Of ``room_for``.
+        copy_cost: What each action that loses content costs, in nats.
+        scores: Filled in, shape [M].
     """
     (codes, known_scores), (missing, numbers) = known, tried
     own, n_missing = sources[action], 0

@@ -110,22 +110,18 @@ class PlainEvidence:
         self, graphs: Sequence[AspectTransitionGraph], looks: Sequence[Evidence], actions: Sequence[int]
     ) -> FloatArray:
         """Return ln p(trial | ATG), and last of an object never met, shape [1 + N, len(graphs) + 1]."""
-        from atg_fg.inference.kernels import memory_tables, table_kernels
+        from atg_fg.inference.kernels.memory_tables import tables_of
         from atg_fg.learning import kind_kernels  # they load Numba
 
         n_known: IntArray = np.array([*(graph.n_known for graph in graphs), 0])
         n_counted: IntArray = np.array([*(graph.n_counted for graph in graphs), 0])
         known: IntArray = np.array([pattern for graph in graphs for pattern in graph.pattern_indices], dtype=np.int64)
         counts = np.concatenate((*(graph.count_table for graph in graphs), np.zeros((0, 4), dtype=np.int64)))
-        room, n_aspects, n_actions = len(looks) + 1, self._assumptions.n_aspects, len(self._assumptions.actions)
-        n_edges, width = len(counts) + room * len(n_known), 1 + min(int(n_known.max()) + room, n_aspects)
-        types = memory_tables.types_for(self._assumptions)
-        tables = tuple(memory_tables.empty_tables(len(n_known), n_edges, width, n_actions, types))
-        table_kernels.write_rows(tables, n_known, known, n_counted, counts, room, 1.0)
+        tables = tables_of(self._assumptions, (n_known, known, n_counted, counts), len(looks) + 1, 1.0)
         patterns: IntArray = np.array([-1 if look.pattern is None else look.pattern for look in looks])
         result: FloatArray = kind_kernels.log_evidence_of_each(
-            tables,
-            (n_aspects, len(self._assumptions.alphabet)),
+            tuple(tables),
+            (self._assumptions.n_aspects, len(self._assumptions.alphabet)),
             np.array([SURE, *UNCERTAIN]),
             np.array([look.likelihood for look in looks]),
             np.array(actions, dtype=np.int64),

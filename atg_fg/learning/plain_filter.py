@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from typing import Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 
@@ -13,8 +13,11 @@ from atg_fg.core.patterns import Evidence, FloatArray, IntArray
 from atg_fg.inference.recognition_model import COLLECTION, RecognitionModel
 from atg_fg.learning.register_contents import UNIMPORTANT
 
-#: The pattern before, the action since then and the pattern seen, of a look that teaches nothing.
-NOTHING: Final = (None, None, None)
+if TYPE_CHECKING:
+    from atg_fg.inference.kernels.compiled_filter import LookedAt
+
+#: What there is to learn from a look that is only imagined.
+TEACHES_NOTHING: Final = (None, None, None)
 
 
 class PlainFilter:
@@ -56,7 +59,7 @@ class PlainFilter:
         """Take in an action."""
         self._own.act(action)
 
-    def observe(self, evidence: Evidence, seen: tuple[int | None, int | None, int | None] = NOTHING) -> None:
+    def observe(self, evidence: Evidence, seen: LookedAt = TEACHES_NOTHING) -> None:
         """Take in a look, and learn from it.
 
         Args:
@@ -64,7 +67,7 @@ class PlainFilter:
             seen: What there is to learn: the pattern before, the action since then, the pattern seen.
         """
         self._log_total += self._own.look(evidence.likelihood, seen)
-        if seen != NOTHING:
+        if seen != TEACHES_NOTHING:
             self.model.learn(*seen)
         self._last = evidence
 

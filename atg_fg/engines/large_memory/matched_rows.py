@@ -13,9 +13,9 @@ from atg_fg.core.parameters import ModelParameters
 from atg_fg.core.patterns import Evidence, FloatArray
 from atg_fg.engines.large_memory.decision import NextLooks
 from atg_fg.inference.kernels import decision_kernels
-from atg_fg.inference.kernels import table_kernels as kernels
 from atg_fg.inference.kernels.compiled_filter import CompiledRows, LookedAt
-from atg_fg.inference.kernels.memory_tables import ROOM, TrialArrays, empty_tables, types_for
+from atg_fg.inference.kernels.memory_tables import ROOM, TrialArrays, tables_of
+from atg_fg.inference.kernels.table_kernels import Tables
 
 
 class MatchedRows(CompiledRows):
@@ -31,19 +31,13 @@ class MatchedRows(CompiledRows):
     def __init__(
         self, assumptions: Assumptions, parameters: ModelParameters, graphs: GraphArrays, prior: FloatArray
     ) -> None:
-        n_edges, width = len(graphs.source) + ROOM * len(prior), int(graphs.n_known.max(initial=0)) + ROOM
-        width = 1 + min(width, assumptions.n_aspects)
-        tables = empty_tables(len(prior), n_edges, width, len(assumptions.actions), types_for(assumptions))
-        kernels.write_rows(
-            tuple(tables),
-            graphs.n_known.astype(np.int64),
-            graphs.patterns.astype(np.int64),
-            graphs.n_edges.astype(np.int64),
-            np.stack((graphs.source, graphs.action, graphs.target, graphs.counts), axis=1).astype(np.int64),
-            ROOM,
-            float(parameters.transition_concentration),
+        counts = np.stack((graphs.source, graphs.action, graphs.target, graphs.counts), axis=1).astype(np.int64)
+        n_known, patterns, n_edges = (
+            each.astype(np.int64) for each in (graphs.n_known, graphs.patterns, graphs.n_edges)
         )
-        super().__init__(assumptions, parameters, TrialArrays(tables, np.zeros((len(prior), width))), prior)
+        rows = n_known, patterns, n_edges, counts
+        tables = tables_of(assumptions, rows, ROOM, float(parameters.transition_concentration))
+        super().__init__(assumptions, parameters, TrialArrays(tables, np.zeros(tables.pattern.shape)), prior)
         #: ln of what all rows weigh; before the first look that is in ``log_identity``
         self._log_total = 0.0
 
@@ -85,7 +79,7 @@ class MatchedRows(CompiledRows):
             each._aspects = np.pad(each._aspects, more)
             pairs.append(each._tables._replace(pattern=np.pad(each._tables.pattern, more)))
         moved = pairs[1]._replace(begins=pairs[1].begins + len(pairs[0].counted))
-        self._tables = kernels.Tables(*(np.concatenate(pair) for pair in zip(pairs[0], moved, strict=True)))
+        self._tables = Tables(*(np.concatenate(pair) for pair in zip(pairs[0], moved, strict=True)))
         self._arrays = tuple(self._tables)
         for name in ("_aspects", "log_identity", "_shown"):
             setattr(self, name, np.concatenate((getattr(self, name), getattr(other, name))))

@@ -12,8 +12,8 @@ import numpy as np
 from atg_fg.core.aspect_graph import AspectTransitionGraph
 from atg_fg.core.assumptions import Assumptions
 from atg_fg.core.memory import RobotMemory
-from atg_fg.core.patterns import FloatArray
-from atg_fg.inference.kernels.table_kernels import Tables, spread_rows, write_row
+from atg_fg.core.patterns import FloatArray, IntArray
+from atg_fg.inference.kernels.table_kernels import Tables, spread_rows, write_row, write_rows
 
 #: Room that each row has for the aspects and edges that a trial finds, before rows have to be moved.
 ROOM: Final = 12
@@ -189,6 +189,26 @@ def with_more_room(tables: Tables, room: int, n_aspects: int) -> Tables:
 
 #: Tables by memory, which is known by its ``id`` while it lives: memories compare by content.
 _kept: Final[dict[int, dict[float, MemoryTables]]] = {}
+
+
+def tables_of(
+    assumptions: Assumptions, rows: tuple[IntArray, IntArray, IntArray, IntArray], room: int, concentration: float
+) -> Tables:
+    """Return tables of some hypotheses that are not kept, each with room for so many more aspects and edges.
+
+    Args:
+        assumptions: |G|, actions and alphabet.
+        rows: Number of aspects of each [H], their patterns, number of transitions of each [H], and these [E, 4], one
+            hypothesis after the other, as ``write_rows`` takes them.
+        room: Of each.
+        concentration: α.
+    """
+    n_known, _, _, counts = rows
+    n_edges, width = len(counts) + room * len(n_known), int(n_known.max(initial=0)) + room
+    shape = len(n_known), n_edges, 1 + min(width, assumptions.n_aspects), len(assumptions.actions)
+    tables = empty_tables(*shape, types_for(assumptions))
+    write_rows(tuple(tables), *rows, room, concentration)
+    return tables
 
 
 def arrays_for_trial(memory: RobotMemory, concentration: float, trial: object, *, extends: bool) -> TrialArrays:
