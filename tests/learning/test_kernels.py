@@ -151,6 +151,7 @@ def test_paths_with_slips_are_all_there_and_weigh_what_enumeration_says():
         assert found[start, slips][1] == pytest.approx(prior - 0.3 + np.log(novel), abs=1e-12)
 
 
+@pytest.mark.slow
 def test_paths_of_a_long_trial_weigh_what_each_does_alone():
     """There are more histories on the way than there is room for: those that no path has any more are forgotten."""
     trials = drawn_trials(np.random.default_rng(10), n_trials=2, n_looks=90)
